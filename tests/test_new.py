@@ -126,8 +126,8 @@ def test_words_in_brackets_tell_the_joint_by_their_order_and_what_was_wanted_is_
     header = "t,position[pan],position[lift],setpoint_effort[pan],setpoint_effort[lift],effort[pan],effort[lift]"
     new(table(tmp_path / "run.csv", t, q, effort(q, dq), effort(q, dq), header=header))
     assert held(tmp_path) == {
-        "time": "t", "joint_1.q": "position[pan]", "joint_2.q": "position[lift]",
-        "joint_1.tau": "effort[pan]", "joint_2.tau": "effort[lift]",
+        "time": "t", "pan.q": "position[pan]", "lift.q": "position[lift]",
+        "pan.tau": "effort[pan]", "lift.tau": "effort[lift]",
     }  # fmt: skip
 
 
@@ -168,18 +168,18 @@ def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
     new(*made.values())
     roles = {entry.name: entry.role for entry in reading.read(tmp_path).logs}
     assert roles == {
-        "a": "identification", "b": "validation", "c_noweight": "validation", "d_205g": "contact", "e": "friction",
+        "a": "identification", "b": "validation", "c_noweight": "validation", "d_205g": "weight", "e": "friction",
     }  # fmt: skip
     assert "# weight = { mass = 0.205," in (tmp_path / "study.toml").read_text()
 
 
-def test_where_nothing_repeats_all_logs_are_identified_from(tmp_path):
+def test_where_nothing_repeats_all_logs_but_the_one_that_tests_are_identified_from(tmp_path):
     files = []
-    for seed in (4, 5):
+    for seed in (4, 5, 6):
         t, q, dq = motion(4, seed, repeats=False)
         files.append(table(tmp_path / f"run-{seed}.csv", t, q, dq, effort(q, dq)))
     new(*files)
-    assert {entry.role for entry in reading.read(tmp_path).logs} == {"identification"}
+    assert [entry.role for entry in reading.read(tmp_path).logs] == ["identification", "identification", "validation"]
 
 
 def test_files_of_one_signal_each_are_joined(tmp_path):
@@ -213,9 +213,9 @@ def test_inspect_and_new_name_the_same_clock(tmp_path, header):
 
 
 FOLDERS = {  # robot and roles that the recordings ask for
-    "dvrk_wpi": ("dvrk_psm", ["identification", "contact", "validation"]),
-    "dvrk_slide": ("dvrk_psm", ["identification", "friction", "friction", "identification"]),
-    "ur10e": ("robot.toml", ["identification", "identification", "identification"]),
+    "dvrk_wpi": ("dvrk_psm", ["identification", "weight", "validation"]),
+    "dvrk_slide": ("dvrk_psm", ["identification", "friction", "friction", "validation"]),
+    "ur10e": ("robot.toml", ["validation", "identification", "identification"]),
     "palpation": ("davinci", ["tissue", "tissue"]),
     "ur5": ("robot.toml", ["contact"]),
 }

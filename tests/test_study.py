@@ -471,7 +471,6 @@ def test_a_mass_may_be_left_out_and_move_with_a_link_or_a_joint(tmp_path):
 @pytest.mark.parametrize(
     ("written", "says"),
     [
-        ("", "3: log 'a': a weight log needs weight = { moves_with = ..., position = ... }, with mass = ... if known"),
         (HANGS.replace('"5"', '"elbow"'), "8: log 'a'.weight: moves_with must be one of hand_roll, hand_pitch, "),
         (HANGS.replace("0.2]", "200]"), "8: log 'a'.weight: position must lie within 3 m of the remote centre, not "),
         (HANGS.replace("0.2]", "0.2], mass = -1"), "8: log 'a'.weight: mass must be finite and greater than 0, not -1"),

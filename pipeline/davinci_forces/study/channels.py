@@ -126,7 +126,9 @@ def _unit(table: TomlTable, needed: str) -> str:
     """The listed spelling of a unit, which must measure what is needed."""
     unit = table.values["unit"]
     kind = measures(unit) if isinstance(unit, str) else None
-    if kind is None:
+    if unit == "":
+        table.problem(f"unit is missing; it is one of {', '.join(u for u in UNITS if measures(u) == needed)}", "unit")
+    elif kind is None:
         table.problem(f"unknown unit {excerpt(unit)}; known units are {', '.join(UNITS)}", "unit")
     elif kind != needed:
         table.problem(f"{unit!r} measures {kind}, but {needed} is needed", "unit")

@@ -185,8 +185,6 @@ def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:
 
 def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
     if "weight" not in table:
-        if table.values.get("role") == "weight":
-            table.problem("a weight log needs weight = { moves_with = ..., position = ... }, with mass = ... if known")
         return None
     weight = table.table("weight")
     mass = weight.number("mass", above=0.0, expected="a number of kg") if "mass" in weight else None

@@ -1,18 +1,23 @@
 """Read `raw/<study>/study.toml`, and report all its problems at once, each with its line."""
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from davinci_forces import robots, toml
-from davinci_forces.errors import BadRobot, BadStudy
+from davinci_forces.errors import BadLog, BadRobot, BadStudy
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.haptics import scenario as haptics
+from davinci_forces.logs import open_log
 from davinci_forces.robots import Robot, from_toml
 from davinci_forces.robots.models import VARIANTS
-from davinci_forces.study import HapticScenario, Settings, Study
+from davinci_forces.study import HapticScenario, LogEntry, Settings, Study
 from davinci_forces.study.entries import check_positive, entries_of, is_inside, lines_of_files
+from davinci_forces.study.guessing import clock_hint
+from davinci_forces.study.timing import has_clock
 from davinci_forces.toml import TomlTable
 
 # Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
@@ -57,6 +62,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
         for file, line in lines.items():
             if not (folder / file).exists():
                 table.file.note(line, f"file {file!r} is not in {folder}")
+        _note_missing_clocks(table, logs, folder)
     table.file.refuse(BadStudy)
     assert robot is not None
     robot_file = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
@@ -65,6 +71,19 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     return Study(
         folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, robot_file, lines, remarks
     )
+
+
+def _note_missing_clocks(table: TomlTable, logs: Sequence[LogEntry], folder: Path) -> None:
+    """Note the logs without a clock beside other problems, so that all missing keys are known at once."""
+    for i, entry in enumerate(logs):
+        if entry.rate or not entry.needs_clock or any(source.quantity == "time" for source in entry.channels):
+            continue
+        with suppress(BadLog):
+            log = open_log(folder / entry.files[0]) if len(entry.files) == 1 else None
+            if log and not has_clock(log):
+                hint = clock_hint(log)
+                either = f"{hint}; or " if hint else ""
+                table.problem(f"log {entry.name!r}: rate is missing: write {either}rate = ... [Hz]", "log", i)
 
 
 def _baseline(table: TomlTable, folder: Path) -> str:

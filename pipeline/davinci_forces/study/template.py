@@ -14,7 +14,7 @@ from davinci_forces.errors import BadLog, BadRequest
 from davinci_forces.logs import BAG, open_log
 from davinci_forces.logs.joined import Joined
 from davinci_forces.logs.log import Channel, Log
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.tissue.palpation import touches_at_once
 from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study.belonging import Arm, arm_of, candidates, group_recordings, guess_joined, split_signal
@@ -27,7 +27,6 @@ from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
 MAX_TURN = 6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
-MIN_EARLY_RISE = 0.05  # share of a push's force within the first quarter of its depth, if it touches from the start
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
 
@@ -391,20 +390,9 @@ def _touches_throughout(draft: DraftLog) -> str:
         return ""
     push, depth, force = (samples_of(draft.log, names)[name] for name in names)
     starts = np.flatnonzero(np.diff(push)) + 1
-    rises = [_early_rise(d, f) for d, f in zip(np.split(depth, starts), np.split(force, starts), strict=True)]
-    if rises and float(np.median(rises)) >= MIN_EARLY_RISE:
+    if touches_at_once(list(zip(np.split(depth, starts), np.split(force, starts), strict=True))):
         return "the force rises from the first sample of each push on, as of a probe that touches the surface"
     return ""
-
-
-def _early_rise(depth: Array, force: Array) -> float:
-    """Rise of the force within the first quarter of a push's depth, as a share of its whole rise."""
-    deepest = int(np.argmax(np.abs(depth - depth[0])))
-    way = np.abs(depth[: deepest + 1] - depth[0])
-    if deepest < 4 or not way[-1] > 0:
-        return 0.0
-    quarter, whole = np.interp(0.25 * way[-1], way, force[: deepest + 1]) - force[0], force[deepest] - force[0]
-    return float(quarter / whole) if whole else 0.0
 
 
 def _in_millimetres(log: Log, touching: dict[str, str]) -> set[str]:

@@ -38,9 +38,13 @@ def smoothed_course(q: Array, dq: Array, tau: Array, step: float) -> Course:
 
 
 def _regressor(course: Course, speed: float) -> Array:
-    """Offset, gravity as a parabola, viscous and Coulomb friction, inertia: (N, 6)."""
+    """Offset, gravity of a turn and as a parabola, viscous and Coulomb friction, inertia: (N, 8).
+
+    The parabola serves angles of a motor, whose gear is not known.
+    """
     q, dq, ddq, _ = course
-    return np.column_stack([np.ones_like(q), q, q * q, dq, np.tanh(dq / max(REVERSAL * speed, 1e-12)), ddq])
+    coulomb = np.tanh(dq / max(REVERSAL * speed, 1e-12))
+    return np.column_stack([np.ones_like(q), np.sin(q), np.cos(q), q, q * q, dq, coulomb, ddq])
 
 
 def has_outliers(course: Course) -> bool:
@@ -61,12 +65,18 @@ def has_outliers(course: Course) -> bool:
 def unexplained_share(course: Course, references: Sequence[Course]) -> float:
     """Deviation of the effort from a model fitted to other courses of the joint, as a share of the effort's own.
 
-    The smaller where references themselves leave more: a model that does not describe them judges no other.
+    Only where the other courses have been, in position and speed; 0 where that is less than half of the course, or
+    where their own efforts deviate by half as much: a model that does not describe them judges no other.
     """
+    low, high = min(float(r.q.min()) for r in references), max(float(r.q.max()) for r in references)
     speed = max(float(np.abs(reference.dq).max()) for reference in references)
+    inside = (course.q >= low) & (course.q <= high) & (np.abs(course.dq) <= speed)
+    if 2 * inside.sum() < len(inside):
+        return 0.0
     Phi = np.concatenate([_regressor(reference, speed) for reference in references])
     tau = np.concatenate([reference.tau for reference in references])
-    theta = np.linalg.lstsq(Phi, tau, rcond=None)[0]
+    size = np.maximum(np.abs(Phi).max(axis=0), 1e-300)
+    theta = np.linalg.lstsq(Phi / size, tau, rcond=None)[0] / size
     left = float((tau - Phi @ theta).std() / max(tau.std(), 1e-300))
-    share = float((course.tau - _regressor(course, speed) @ theta).std() / max(course.tau.std(), 1e-300))
+    share = float((course.tau - _regressor(course, speed) @ theta)[inside].std() / max(course.tau[inside].std(), 1e-300))
     return share if share > 2 * left else 0.0

@@ -24,6 +24,7 @@ USUAL_SPEED_QUANTILE = 0.95  # quantile of the speeds of a push that is its usua
 MAX_DEPTH = 0.3  # [m] the unit of a larger depth is probably wrong
 MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e5  # [N/m]
 MIN_R2 = 0.9  # smallest R^2 of a straight line through a push that counts
+MIN_EARLY_RISE = 0.05  # share of the force within the first quarter of the depth, if a push touches from its start
 MAX_NAMED = 5  # largest number of pushes that a remark names
 
 
@@ -42,6 +43,21 @@ def between_troughs(x: Array, rises: float = MIN_PROMINENCE) -> list[slice]:
     peaks = find_peaks(padded, prominence=rises * (high - low))[0] - 1
     troughs = [a + int(np.argmin(x[a : b + 1])) for a, b in pairwise(peaks)]
     return [slice(a, b) for a, b in pairwise([0, *troughs, len(x)]) if b > a]
+
+
+def touches_at_once(pushes: Sequence[tuple[Array, Array]]) -> bool:
+    """Whether the force (N,) of most pushes rises with the depth (N,) from the first sample on, without an approach."""
+    return bool(pushes) and float(np.median([_early_rise(*push) for push in pushes])) >= MIN_EARLY_RISE
+
+
+def _early_rise(depth: Array, force: Array) -> float:
+    """Rise of the force within the first quarter of a push's depth, as a share of its whole rise."""
+    deepest = int(np.argmax(np.abs(depth - depth[0])))
+    way = np.abs(depth[: deepest + 1] - depth[0])
+    if deepest < MIN_SAMPLES_SIGN or not way[-1] > 0:
+        return 0.0
+    quarter, whole = np.interp(way[-1] / 4, way, force[: deepest + 1]) - force[0], force[deepest] - force[0]
+    return float(quarter / whole) if whole else 0.0
 
 
 class Probing(NamedTuple):

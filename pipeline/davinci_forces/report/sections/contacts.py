@@ -124,6 +124,8 @@ def reason(entry: LogEntry, track: Track | None) -> str:
     """The reason why no contact was measured on a joint of a log."""
     if entry.role == "friction":
         return "a friction log gives friction maps; its external effort is not tracked"
+    if entry.role == "weight" and entry.weight is None:
+        return "its weight is not described; write weight = { moves_with = ..., position = ... }, and its mass is estimated"
     if track is None:
         return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:

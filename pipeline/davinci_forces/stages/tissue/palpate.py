@@ -8,7 +8,14 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
 from davinci_forces.maths.signals.windows import unbroken
 from davinci_forces.maths.tissue.indentation import median_std
-from davinci_forces.maths.tissue.palpation import PalpatedPush, Probing, evaluate_pushes, known_samples, remarks
+from davinci_forces.maths.tissue.palpation import (
+    PalpatedPush,
+    Probing,
+    evaluate_pushes,
+    known_samples,
+    remarks,
+    touches_at_once,
+)
 from davinci_forces.maths.tissue.tissue import (
     LAWS,
     FittedLaw,
@@ -49,6 +56,11 @@ def run(
     pushes = evaluate_pushes(data, windows, whole, rate_of(data.t), lowpass)
     touched = [push for push in pushes if push.line is not None]
     texts = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
+    if not entry.contact and data.push.any() and touches_at_once(numbered_pushes(data)):
+        texts.append(
+            f"{entry.name}: the force rises from the first sample of each push on, but its contact is searched, which "
+            'changes the stiffness; write contact = "all" if the probe touches from the start, else contact windows'
+        )
     if texts:
         yield diagnostic("palpate", entry.name, "warning", *texts)
     if not touched:
@@ -59,6 +71,13 @@ def run(
     yield stiffness_of(touched, entry.name, slide.joint if by_joint and slide else "force sensor", len(pushes))
     if best is not None:
         yield model_of(models, best, why, touched, entry.name)
+
+
+def numbered_pushes(data: Probing) -> list[tuple[Column, Column]]:
+    """Depth and force (N,) of each push that the log numbers."""
+    starts = np.flatnonzero(np.diff(data.push)) + 1
+    way = np.linalg.norm(data.depth - data.depth[0], axis=1) if data.depth.shape[1] > 1 else data.depth[:, 0]
+    return list(zip(np.split(way, starts), np.split(data.size, starts), strict=True))
 
 
 def prismatic_track(tracks: Sequence[Track], robot: Robot) -> Track | None:
