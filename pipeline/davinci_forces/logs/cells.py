@@ -101,7 +101,7 @@ def parse(
     types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
     types |= {f"{i}": pa.string() for i in wanted if i in times}
     table = csv.read_csv(
-        pa.py_buffer(block),
+        _arrow_memory(block),
         read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PARSE_BYTES),
         parse_options=csv.ParseOptions(delimiter=delimiter.decode(), quote_char='"' if quoted else False),
         convert_options=csv.ConvertOptions(
@@ -121,6 +121,17 @@ def parse(
         texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
         empty={i: absent(column) for i, column in columns.items() if column.null_count},
     )
+
+
+def _arrow_memory(block: bytes) -> pa.Buffer:
+    """Copy bytes to memory of Arrow.
+
+    Threads of Arrow may release it after `read_csv` has returned. Memory of Python they release through the
+    interpreter, and if that is ending by then, the process aborts.
+    """
+    buffer = pa.allocate_buffer(len(block))
+    np.frombuffer(buffer, np.uint8)[:] = np.frombuffer(block, np.uint8)
+    return buffer
 
 
 def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int], text: int = -1) -> Cells:

@@ -13,7 +13,7 @@ from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.study.names import IN_DEGREES, Numbered, is_time, numbered, psm_joint, symbol_of, unit_of_name, words_of
+from davinci_forces.study.names import IN_DEGREES, Numbered, is_time, numbered, psm_joint, stated_unit, symbol_of, unit_of_name, words_of
 from davinci_forces.study.timing import MAX_CHANNELS, Timing, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
@@ -132,7 +132,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
             continue
         symbol = _side(symbol, words, channel, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
-            unit = "" if channel.unit else unit_of_name(channel.name)
+            unit = "" if stated_unit(channel) else unit_of_name(channel.name)
             meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name", unit)
     return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
 
@@ -171,7 +171,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     labels = [*groups["q"].names]
     numbers = [int(label) for label in labels if label.isdecimal()]
     first = min(numbers) if numbers and min(numbers) <= 1 else 0
-    units = {channel.name: channel.unit for channel in channels}
+    units = {channel.name: stated_unit(channel) for channel in channels}
     meanings: dict[str, Meaning] = {}
     for symbol, group in groups.items():
         for label, name in group.names.items():
@@ -231,7 +231,7 @@ def _read_motion(log: Log, holding: Holding) -> Holding:
 def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: bool = False) -> Holding:
     """Add the times, which joints move, whether the motion repeats, and whether one joint moves at constant velocities.
     """
-    units = {c.name: c.unit for c in log.channels}
+    units = {c.name: stated_unit(c) for c in log.channels}
     by_symbol: dict[str, dict[int, Array]] = {"q": {}, "dq": {}, "tau": {}}
     for name, meaning in holding.meanings.items():
         unit = units.get(name, "") or meaning.unit

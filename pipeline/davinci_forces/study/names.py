@@ -64,8 +64,8 @@ def unit_of_name(name: str) -> str:
 
     Single letters count in brackets and after a stroke only.
     """
-    last = re.split(r"[/\s]", name.strip())[-1]
-    for written in (unit_in(name), last if "/" in name else "", "/".join(name.split("/")[-2:]).split()[-1]):
+    rate = "/".join(name.split("/")[-2:]).split()[-1:]
+    for written in (unit_in(name), *rate, re.split(r"[/\s]", name.strip())[-1] if "/" in name else ""):
         if written and (measures(written) or written in SHORT_TIMES):
             return canonical(written)
     parts = re.split(r"[^A-Za-z]+", unit_in(name) or name)
@@ -75,6 +75,11 @@ def unit_of_name(name: str) -> str:
             per_second = after[:1] == ["s"] or after == ["per", "s"] or after == ["per", "sec"]
             return f"{unit}/s" if per_second and unit in ("deg", "rad", "mm") else unit
     return ""
+
+
+def stated_unit(channel: Channel) -> str:
+    """The unit that the log states; the label of a joint in brackets, as in `q[0]`, is none."""
+    return "" if channel.name.endswith(f"[{channel.unit}]") and not measures(canonical(channel.unit)) else channel.unit
 
 
 def is_time(channel: Channel) -> bool:
@@ -89,6 +94,8 @@ def is_time(channel: Channel) -> bool:
 
 def symbol_of(words: Sequence[str]) -> str:
     """The symbol of a measured quantity of a joint; "" for commands, quantities of the tip, and anything else."""
+    if "".join(words).startswith("macur"):  # of KUKA's RSI, in per cent
+        return ""
     if set(words) & {*COMMAND_WORDS, *OTHER_WORDS} or ("d" in words and set(words) & {"q", "dq", "tau"}):
         return ""
     return next((symbol for symbol, telling in SIGNAL_WORDS.items() if set(telling) & set(words)), "")
@@ -114,7 +121,7 @@ def _words(key: str) -> list[str]:
     """The words of a name without the joint: those of its last part with a symbol, and commands of any part."""
     parts = [words_of(part) for part in re.split(r"[/.]", key)]
     last = next((words for words in reversed(parts) if symbol_of(words)), [])
-    marking = {*COMMAND_WORDS, *OTHER_WORDS}
+    marking = {*COMMAND_WORDS, *OTHER_WORDS, *IN_DEGREES}
     return last + [word for words in parts for word in words if word in marking]
 
 

@@ -16,12 +16,12 @@ from davinci_forces.logs.joined import Joined
 from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.tissue.palpation import touches_at_once
 from davinci_forces.maths.units import SI, canonical, measures
-from davinci_forces.robots.robot import Kind, Robot
+from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study.belonging import Arm, arm_of, candidates, group_recordings, guess_joined, split_signal
-from davinci_forces.study.channels import OF_THE_LOG, is_tissue, tissue_channels, unit_of
+from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, is_tissue, tissue_channels, unit_of
 from davinci_forces.study.entries import ROLES
-from davinci_forces.study.guessing import POSITIONS, VELOCITIES, Holding, Meaning, guess
-from davinci_forces.study.names import is_time
+from davinci_forces.study.guessing import Holding, Meaning, guess
+from davinci_forces.study.names import is_time, stated_unit
 from davinci_forces.study.roles import Recording, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
@@ -309,7 +309,7 @@ class _Writer:
         """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
         wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
                 if max(-low, high) > MAX_TURN}  # fmt: skip
-        units = {channel.name: channel.unit for channel in self.draft.log.channels}
+        units = {channel.name: stated_unit(channel) for channel in self.draft.log.channels}
         return {
             name for name, m in self.draft.guess.meanings.items()
             if m.joint in wide and m.symbol in ("q", "dq") and not m.unit and not units.get(name)
@@ -344,9 +344,10 @@ class _Writer:
             count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
             return f'# "<joint>.{meaning.symbol}" = {_text(channel.name)}  # {count}'
         joint, holding = self.robot.joints[meaning.joint], self.draft.guess
-        unit = _fitting(meaning, joint.kind)
+        stated = stated_unit(channel)
+        unit = _fitting(meaning, joint, hides_unit=stated != channel.unit)
         value = f"{{ channel = {_text(channel.name)}, unit = {_text(unit)} }}" if unit else _text(channel.name)
-        note = f"in {channel.unit}" if channel.unit else f"in {unit}" if unit else "no unit: SI"
+        note = f"in {stated}" if stated else f"in {unit}" if unit else "no unit: SI"
         if unit_unknown:
             rate = "/s" if meaning.symbol == "dq" else ""
             value = f'{{ channel = {_text(channel.name)}, unit = "" }}'
@@ -357,16 +358,16 @@ class _Writer:
         return f"{line}  # {meaning.reason}; {note}"
 
 
-def _fitting(meaning: Meaning, kind: Kind) -> str:
-    """The unit in a channel's name, if it measures the quantity; a velocity called deg is in deg/s."""
-    unit = f"{meaning.unit}/s" if meaning.symbol in VELOCITIES and measures(f"{meaning.unit}/s") else meaning.unit
-    revolute = kind is Kind.REVOLUTE or meaning.symbol.endswith("_m")
-    needed = (
-        ("angle" if revolute else "length") if meaning.symbol in POSITIONS
-        else ("angle rate" if revolute else "length rate") if meaning.symbol in VELOCITIES
-        else "current" if meaning.symbol == "i" else "torque" if revolute else "force"
-    )  # fmt: skip
-    return unit if measures(unit) == needed else ""
+def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
+    """The unit in a channel's name, if it measures the quantity; a velocity called deg is in deg/s.
+
+    `hides_unit`: the log takes a label for the unit, so that the unit has to be stated.
+    """
+    at_motor = meaning.symbol.endswith("_m")
+    position, effort = ("angle", "torque") if at_motor or joint.kind is Kind.REVOLUTE else ("length", "force")
+    needed = OF_A_JOINT[meaning.symbol].format(position=position, effort=measures(joint.effort) or effort)
+    units = (meaning.unit, f"{meaning.unit}/s", SI[needed] if hides_unit else "")
+    return next((unit for unit in units if measures(unit) == needed), "")
 
 
 def _time_line(channel: Channel, size: float, reason: str) -> str:

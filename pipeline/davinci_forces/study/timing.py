@@ -133,7 +133,7 @@ def _judged(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], un
     strict = np.concatenate([[True], np.diff(t) > 0])
     slope = slope_of([(q[strict], dq[strict]) for q, dq in pairs if len(q) == len(t)], t[strict])
     shape = "increases throughout" if strict.all() else "increases"
-    if np.all(np.diff(t) == 1.0) and not known and not (slope and slope.agrees(1.0)):
+    if np.allclose(np.diff(t), 1.0, rtol=0, atol=1e-9 * abs(t[-1])) and not known and not (slope and slope.agrees(1.0)):
         return None  # a counter of samples
     since = next((name for name, s in SIZES.items() if YEARS[0] < t[0] * s < YEARS[1]), "")
     sizes = [known] if known else [SIZES[since]] if since else []

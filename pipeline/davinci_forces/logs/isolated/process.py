@@ -110,6 +110,7 @@ class Child:
             yield
         finally:
             timer.cancel()
+            timer.join()  # a thread that still runs when the interpreter ends may abort the process
 
     def _end_late(self) -> None:
         self.late = True
