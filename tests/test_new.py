@@ -1,6 +1,7 @@
 """What `new` makes of logs that nobody described: by content, by numbers in names, by motion and by size."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from davinci_forces.study import reading
 from tests.test_runs import call
 
 RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
+DEMO = Path(__file__).parents[1] / "raw" / "davinci-demo"
 
 
 def motion(joints: int, seed: int = 0, repeats: bool = True) -> tuple[np.ndarray, ...]:
@@ -262,3 +264,37 @@ def test_a_urdf_beside_the_logs_is_the_robot_and_currents_are_its_effort(data, t
     assert held(tmp_path)["elbow_joint.i"] == "column_15"
     assert {joint.effort for joint in reading.read(tmp_path).robot.joints} == {"A"}
     assert not (tmp_path / "robot.toml").exists()
+
+
+def demonstration(tmp_path, *, neutral: bool) -> dict[str, str]:
+    """What `new` makes of the logs of the demonstration: the role of each file, by its shipped name."""
+    shipped = reading.read(DEMO)
+    names = {file: file for entry in shipped.logs for file in entry.files}
+    if neutral:  # in an order that tells nothing
+        names = {f: f"log_{sum(map(ord, f[::-1])) * 7919 % 997}_{k}.{f[-4:].strip('.')}" for k, f in enumerate(names)}
+    for file, name in names.items():
+        shutil.copy(DEMO / file, tmp_path / name)
+    new(tmp_path)
+    roles = {entry.files[0]: entry.role for entry in reading.read(tmp_path).logs}
+    return {file: roles[name] for file, name in names.items()}
+
+
+def test_the_logs_of_the_demonstration_become_the_shipped_study(tmp_path):
+    shipped = reading.read(DEMO)
+    assert demonstration(tmp_path, neutral=False) == {entry.files[0]: entry.role for entry in shipped.logs}
+    drafted = {entry.files: entry for entry in reading.read(tmp_path).logs}
+    for entry in shipped.logs:
+        mine = {s.quantity: str(s.channel).rpartition("/")[2] for s in drafted[entry.files].channels}
+        assert mine == {s.quantity: str(s.channel).rpartition("/")[2] for s in entry.channels}
+
+
+def test_without_their_names_motion_and_effort_tell_the_roles_of_the_demonstration(tmp_path):
+    """A mass changes the effort as a drift does, and tissue is a contact: without a name, no more can be known."""
+    alike = {"tissue": "contact", "weight": "validation"}
+    expected = {entry.files[0]: alike.get(entry.role, entry.role) for entry in reading.read(DEMO).logs}
+    identifying = [file for file, role in expected.items() if role == "identification"]
+    roles = demonstration(tmp_path, neutral=True)
+    swapped = {file: file.replace("matched", "realistic") for file in identifying}
+    for file, twin in swapped.items():  # of two logs of one path, either identifies, and the other tests
+        assert {roles.pop(file), roles.pop(twin)} == {"identification", "validation"}
+    assert roles == {file: role for file, role in expected.items() if file in roles}

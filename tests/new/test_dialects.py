@@ -1,4 +1,4 @@
-"""Folders as recorders and laboratories write them, each made here: `new` describes them right, or says what is missing.
+"""Folders as recorders and laboratories write them: `new` describes them right, or says what is missing.
 
 Right is what `ingest` then reads: positions, velocities and efforts of every joint in SI at the right times, from the
 numbers that were written, and not only the text of study.toml.
@@ -40,10 +40,19 @@ def csv(*templates: str, first: int = 1, delimiter: str = ",", units: str = "", 
         joints = blocks[0].shape[1]
         used = list(zip(blocks, scales[1:], strict=True))[:: 1 if len(templates) == 3 else 2]
         header = [*([time] if time else []), *(name for t in templates for name in names(t, joints, first))]
-        text = [delimiter.join(header), *([delimiter.join(units.split()[:1] + [u for u in units.split()[1:] for _ in range(joints)])] if units else [])]
+        text = [
+            delimiter.join(header),
+            *(
+                [delimiter.join(units.split()[:1] + [u for u in units.split()[1:] for _ in range(joints)])]
+                if units
+                else []
+            ),
+        ]
         columns = ([start + t * scales[0]] if time else []) + [signal * scale for signal, scale in used]
         numbers = np.column_stack(columns)
-        rows = [delimiter.join(f"{x:.17g}" if i == 0 and time else f"{x:.9g}" for i, x in enumerate(row)) for row in numbers]
+        rows = [
+            delimiter.join(f"{x:.17g}" if i == 0 and time else f"{x:.9g}" for i, x in enumerate(row)) for row in numbers
+        ]
         file.write_text("\n".join([*text, *rows]) + "\n")
 
     return write
@@ -54,22 +63,27 @@ DEGREES = (1.0, DEG, DEG, 1.0)
 SINCE_1970 = 1.75e9
 # name: writer, scales of time and signals, start of the time in its unit, joints, suffix of the efforts' symbol
 RIGHT = {
-    "rtde": (csv("actual_q_{}", "actual_qd_{}", "actual_current_{}", first=0, delimiter=" ", time="timestamp"), ONE, 81234.5, 6),
+    "rtde": (csv("actual_q_{}", "actual_qd_{}", "actual_current_{}", first=0, delimiter=" ", time="timestamp"), ONE,
+             81234.5, 6),
     "rostopic echo -p": (csv("field.position{}", "field.velocity{}", "field.effort{}", first=0, time="%time"),
                          (1e9, 1, 1, 1), SINCE_1970 * 1e9, 4),
-    "crtk": (csv("/PSM9/measured_js/position[{}]", "/PSM9/measured_js/velocity[{}]", "/PSM9/measured_js/effort[{}]", first=0,
-                 time="/PSM9/measured_js/header/stamp"), ONE, SINCE_1970, 4),
+    "crtk": (csv("/PSM9/measured_js/position[{}]", "/PSM9/measured_js/velocity[{}]", "/PSM9/measured_js/effort[{}]",
+                 first=0, time="/PSM9/measured_js/header/stamp"), ONE, SINCE_1970, 4),
     "franka": (csv("q[{}]", "dq[{}]", "tau_J[{}]", first=0, time="time [ms]"), (1e3, 1, 1, 1), 0.0, 7),
     "kuka fri": (csv("measuredJointPosition_A{}", "measuredJointVelocity_A{}", "measuredTorque_A{}"), ONE, 0.0, 7),
-    "kinova": (csv("actuators[{}].position", "actuators[{}].velocity", "actuators[{}].torque", first=0), DEGREES, 0.0, 7),
+    "kinova": (csv("actuators[{}].position", "actuators[{}].velocity", "actuators[{}].torque", first=0), DEGREES, 0.0,
+               7),
     "plotjuggler": (csv("/joint_states/panda_joint{}/position", "/joint_states/panda_joint{}/velocity",
                         "/joint_states/panda_joint{}/effort", time="__time"), ONE, SINCE_1970, 7),
     "one joint": (csv("pos", "vel", "eff"), ONE, 0.0, 1),
     "Joint1_Pos": (csv("Joint{}_Pos", "Joint{}_Vel", "Joint{}_Torque", delimiter=";"), ONE, 0.0, 3),
-    "units after a stroke": (csv("q{} / deg", "dq{} / deg/s", "tau{} / Nm", time="time / ms"), (1e3, DEG, DEG, 1), 0.0, 3),
+    "units after a stroke": (csv("q{} / deg", "dq{} / deg/s", "tau{} / Nm", time="time / ms"), (1e3, DEG, DEG, 1),
+                             0.0, 3),
     "units after a dash": (csv("q{}_deg", "dq{}_deg_s", "tau{}_Nm", time="time_ms"), (1e3, DEG, DEG, 1), 0.0, 3),
-    "units in round brackets": (csv("q{} (deg)", "dq{} (deg/s)", "tau{} (mN m)", time="Time (s)"), (1, DEG, DEG, 1e3), 0.0, 3),
-    "units in square brackets": (csv("q{} [deg]", "dq{} [rad/s]", "current{} [mA]", time="t [us]"), (1e6, DEG, 1, 1e3), 0.0, 3),
+    "units in round brackets": (csv("q{} (deg)", "dq{} (deg/s)", "tau{} (mN m)", time="Time (s)"), (1, DEG, DEG, 1e3),
+                               0.0, 3),
+    "units in square brackets": (csv("q{} [deg]", "dq{} [rad/s]", "current{} [mA]", time="t [us]"), (1e6, DEG, 1, 1e3),
+                                0.0, 3),
     "a row of units": (csv("q{}", "dq{}", "tau{}", units="ms deg deg/s Nm"), (1e3, DEG, DEG, 1), 0.0, 3),
     "microseconds since 1970": (csv("q{}", "qd{}", "tau{}", time="timestamp"), (1e6, 1, 1, 1), SINCE_1970 * 1e6, 3),
     "milliseconds without a unit": (csv("q{}", "qd{}", "tau{}", time="t"), (1e3, 1, 1, 1), 0.0, 3),
@@ -137,7 +151,14 @@ def said(*arguments: object) -> tuple[int, str]:
 
 def test_commands_quantities_of_the_tip_and_models_are_not_measured_at_joints(tmp_path):
     t, q, dq, tau = recorded(0, 2, repeats=True)
-    wrong = ["q_d[{}]", "target_q_{}", "actual_TCP_pose_{}", "tau_ext_hat_filtered[{}]", "O_F_ext_hat_K[{}]", "tau_J_d[{}]"]
+    wrong = [
+        "q_d[{}]",
+        "target_q_{}",
+        "actual_TCP_pose_{}",
+        "tau_ext_hat_filtered[{}]",
+        "O_F_ext_hat_K[{}]",
+        "tau_J_d[{}]",
+    ]
     header = ["t", *(n for w in wrong for n in names(w, 2, 0)), *names("q[{}]", 2, 0), *names("tau_J[{}]", 2, 0)]
     table(tmp_path / "run.csv", t, *(np.cos(q + k) for k in range(len(wrong))), q, tau, header=",".join(header))
     call("new", tmp_path)
@@ -152,7 +173,9 @@ def test_an_arm_of_other_joints_is_no_da_vinci_though_its_third_angle_is_small(t
     assert reading.read(tmp_path).robot.name == "robot"
 
 
-@pytest.mark.parametrize("labels", [("outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"), ("yaw", "pitch", "insertion", "roll")])
+@pytest.mark.parametrize(
+    "labels", [("outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"), ("yaw", "pitch", "insertion", "roll")]
+)
 def test_the_labels_of_the_research_kit_are_its_joints_and_its_roll_is_of_the_wrist(tmp_path, labels):
     t, q, dq, tau = recorded(0, 4, repeats=True)
     header = ["t", *(f"/PSM1/measured_js/{s}[{label}]" for s in ("position", "velocity", "effort") for label in labels)]
@@ -287,7 +310,13 @@ def test_probes_that_touch_from_the_start_are_in_contact_throughout(tmp_path, ap
 
 def test_the_report_says_what_a_missing_contact_changes(tmp_path):
     depth = np.tile(np.linspace(0, 10, 30), 6)
-    table(tmp_path / "raw/a/probes.csv", np.repeat(np.arange(6), 30), depth, 0.1 * depth**1.5, header="probe,depth_mm,force_N")
+    table(
+        tmp_path / "raw/a/probes.csv",
+        np.repeat(np.arange(6), 30),
+        depth,
+        0.1 * depth**1.5,
+        header="probe,depth_mm,force_N",
+    )
     call("new", tmp_path / "raw/a")
     file = tmp_path / "raw/a/study.toml"
     file.write_text(file.read_text().replace('contact = "all"', '# contact = "all"'))

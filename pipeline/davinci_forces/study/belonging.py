@@ -15,9 +15,9 @@ from davinci_forces import robots
 from davinci_forces.errors import BadRobot
 from davinci_forces.logs.joined import Joined
 from davinci_forces.maths.signals import columns
+from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.maths.units import measures
 from davinci_forces.study.guessing import Holding, Meaning, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import Timing, samples_of
@@ -117,7 +117,11 @@ def _joint_names(holding: Holding) -> list[str]:
 def _prismatic(holdings: Sequence[Holding]) -> set[int]:
     """Joints whose positions or efforts are in units of length or force."""
     meanings = [meaning for holding in holdings for meaning in holding.meanings.values()]
-    return {m.joint for m in meanings if m.symbol in ("q", "dq", "tau") and str(measures(m.unit)).startswith(("length", "force"))}
+    return {
+        m.joint
+        for m in meanings
+        if m.symbol in ("q", "dq", "tau") and str(measures(m.unit)).startswith(("length", "force"))
+    }
 
 
 def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int] = ()) -> str:

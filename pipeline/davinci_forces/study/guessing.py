@@ -13,7 +13,17 @@ from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.study.names import IN_DEGREES, Numbered, is_time, numbered, psm_joint, stated_unit, symbol_of, unit_of_name, words_of
+from davinci_forces.study.names import (
+    IN_DEGREES,
+    Numbered,
+    is_time,
+    numbered,
+    psm_joint,
+    stated_unit,
+    symbol_of,
+    unit_of_name,
+    words_of,
+)
 from davinci_forces.study.timing import MAX_CHANNELS, Timing, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
@@ -38,7 +48,7 @@ class Holding:
     joints: int = 0
     labels: tuple[str, ...] = ()  # of the joints, where names have words for them
     robot: Robot | None = None  # whose joints the names name
-    timing: Timing = Timing()
+    timing: Timing = field(default_factory=Timing)
     moving: tuple[int, ...] = ()  # joints, counted from 0
     repeats: bool = False
     steady: bool = False
@@ -117,7 +127,7 @@ def clock_hint(log: Log) -> str:
 
 
 def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
-    """Assign channels whose names name a joint of the robot: `Roll motor angle`, `position[outer_insertion]`."""
+    """Assign channels whose names name a joint of the robot: `Roll motor angle`."""
     named = {channel.name: words_of(channel.alias or channel.name) for channel in channels if not is_time(channel)}
     of_the_kit = any("insertion" in words for words in named.values()) and any("yaw" in w for w in named.values())
     meanings: dict[str, Meaning] = {}
@@ -138,7 +148,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
 
 
 def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
-    """Leave out the currents of joints with efforts: a study takes one, and an effort needs no constant of the drive."""
+    """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
     with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
     return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
 
@@ -229,8 +239,7 @@ def _read_motion(log: Log, holding: Holding) -> Holding:
 
 
 def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: bool = False) -> Holding:
-    """Add the times, which joints move, whether the motion repeats, and whether one joint moves at constant velocities.
-    """
+    """Add the times, the joints that move, and whether their motion repeats or has constant velocities."""
     units = {c.name: stated_unit(c) for c in log.channels}
     by_symbol: dict[str, dict[int, Array]] = {"q": {}, "dq": {}, "tau": {}}
     for name, meaning in holding.meanings.items():

@@ -31,7 +31,20 @@ OTHER_WORDS = {
 }  # fmt: skip
 ROUGH_WORDS = ("raw", "unfiltered")  # a signal of such a name is taken where there is no other
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
-TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "elapsed", "epoch", "unix", "field", "x"}
+TIME_QUALIFIERS = {
+    "robot",
+    "ros",
+    "system",
+    "rel",
+    "relative",
+    "abs",
+    "header",
+    "elapsed",
+    "epoch",
+    "unix",
+    "field",
+    "x",
+}
 # Units in names, besides those of `maths/units`: by their lower case.
 UNIT_WORDS = {
     "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "rads": "rad", "radians": "rad",
@@ -42,7 +55,11 @@ UNIT_WORDS = {
 SHORT_TIMES = {"us": 1e-6, "ns": 1e-9, "µs": 1e-6}  # [s] units of time that a study gives as a scale
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-PSM_JOINTS = {"yaw": "hand_roll", "pitch": "hand_pitch", "insertion": "instrument_slide"}  # of the da Vinci Research Kit
+PSM_JOINTS = {
+    "yaw": "hand_roll",
+    "pitch": "hand_pitch",
+    "insertion": "instrument_slide",
+}  # of the da Vinci Research Kit
 
 
 @dataclass(frozen=True)
@@ -113,8 +130,12 @@ def numbered(channels: Sequence[Channel]) -> list[Numbered]:
         if keys and not is_time(channel):
             key = max(keys, key=lambda key: len(groups[key]))
             chosen.setdefault(key, {})[keys[key]] = channel.name
-    signals = [Numbered(symbol_of(words), names, tuple(words)) for key, names in chosen.items() for words in [_words(key)]]
-    return sorted((group for group in signals if group.symbol), key=lambda group: bool(set(ROUGH_WORDS) & {*group.words}))
+    signals = [
+        Numbered(symbol_of(words), names, tuple(words)) for key, names in chosen.items() for words in [_words(key)]
+    ]
+    return sorted(
+        (group for group in signals if group.symbol), key=lambda group: bool(set(ROUGH_WORDS) & {*group.words})
+    )
 
 
 def _words(key: str) -> list[str]:
@@ -128,7 +149,9 @@ def _words(key: str) -> list[str]:
 def _labels(channel: Channel) -> Iterator[tuple[str, str]]:
     """Ways to read a joint from a name, the likelier first: what is left of the name, and the label of the joint."""
     name = channel.name
-    spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + [m.span() for m in re.finditer(r"\d+", name)][::-1]
+    spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + [m.span() for m in re.finditer(r"\d+", name)][
+        ::-1
+    ]
     parts = re.split(r"([/.])", name)
     ends = [sum(map(len, parts[: k + 1])) for k in range(len(parts))]
     spans += [

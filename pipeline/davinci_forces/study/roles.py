@@ -50,7 +50,7 @@ class Role(NamedTuple):
 
 
 def roles_of(recordings: Sequence[Recording]) -> list[Role]:
-    """Guess the role of each log: by a word of its file or folders, else by its motion and effort beside the others'."""
+    """Guess the role of each log: by a word of its file or folders, else by its motion and effort among others."""
     words = [_word(recording.path) for recording in recordings]
     if len(words) > 1 and all(word[0] == "test" for word in words):
         words = [("", "")] * len(words)  # a word that all share tells none from the others
@@ -129,8 +129,12 @@ def _by_motion(
     for i in fixed:
         _cover(reach, recordings[i])
     excited = {i: _word(recordings[i].path)[0] == "excitation" for i in rest}
-    order = sorted(rest, key=lambda i: (not recordings[i].holding.repeats, not excited[i], *_size(recordings[i].holding)))
-    varied = {joint for i in [*rest, *fixed] if not recordings[i].holding.steady for joint in recordings[i].holding.moving}
+    order = sorted(
+        rest, key=lambda i: (not recordings[i].holding.repeats, not excited[i], *_size(recordings[i].holding))
+    )
+    varied = {
+        joint for i in [*rest, *fixed] if not recordings[i].holding.steady for joint in recordings[i].holding.moving
+    }
     late: list[int] = []
     for i in order:
         holding, spans = recordings[i].holding, _spans(recordings[i].holding)
@@ -171,7 +175,9 @@ def _samples(holding: Holding) -> float:
 
 def _spans(holding: Holding) -> dict[int, float]:
     """The range of each joint that moves."""
-    return {joint: float(c.q.max() - c.q.min()) for joint, c in holding.courses.items()} or dict.fromkeys(holding.moving, 1.0)
+    return {joint: float(c.q.max() - c.q.min()) for joint, c in holding.courses.items()} or dict.fromkeys(
+        holding.moving, 1.0
+    )
 
 
 def _size(holding: Holding) -> tuple[float, float]:

@@ -237,7 +237,11 @@ class _Writer:
             f"name = {_text(self.name)}",
             f"file = {paths[0]}" if len(paths) == 1 else join,
             *self._role(),
-            *([] if self.draft.touching else ["# period = 10.0  # [s] estimated from the data; a given value is checked"]),
+            *(
+                []
+                if self.draft.touching
+                else ["# period = 10.0  # [s] estimated from the data; a given value is checked"]
+            ),
             *self._rate(),
             "# skip = 1.0  # [s] start-up transient to leave out",
             "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out",
@@ -245,7 +249,7 @@ class _Writer:
             "[log.channels]",
             *self._channels(),
             "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i",
-            "# of the log: time; for tissue also push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z",
+            "# of the log: time; of tissue also push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z",
         ]
         if not self.is_empty:
             return ["", *block]
@@ -333,10 +337,13 @@ class _Writer:
                 yield self._meaning_line(channel, meaning, channel.name in unknown)
             elif channel.name == timing.time:
                 yield _time_line(channel, timing.size, timing.reason)
+            elif channel.name == log.time:
+                yield f"time = {_text(channel.name)}  # the log's own"
             elif is_time(channel) and log.clock is not None:
                 yield f"# time = {_text(channel.name)}  # the log has its own clock"
             else:
-                yield f'# "<joint>.<quantity>" = {_text(channel.name)}{f"  # in {channel.unit}" if channel.unit else ""}'
+                unit = f"  # in {channel.unit}" if channel.unit else ""
+                yield f'# "<joint>.<quantity>" = {_text(channel.name)}{unit}'
 
     def _meaning_line(self, channel: Channel, meaning: Meaning, unit_unknown: bool) -> str:
         """The line of a joint's channel; commented out where the joint does not move or is unknown."""
@@ -384,7 +391,7 @@ def _path(files: Sequence[Path], folder: Path) -> list[str]:
 
 
 def _touches_throughout(draft: DraftLog) -> str:
-    """Why every sample of numbered pushes is of contact: the force rises from the first sample on; "" if it does not."""
+    """Why every sample of numbered pushes is of contact: the force rises from the first sample on; else ""."""
     by_quantity = {quantity: name for name, quantity in draft.touching.items()}
     names = [by_quantity.get(quantity, "") for quantity in ("push", "depth", "force")]
     if not all(names) or len(draft.log.by_clock(names)) > 1:

@@ -178,4 +178,6 @@ def _checked_clock(
     unit = next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None)
     if unit:
         return Timing(step=step, units=(unit,))
-    return Timing(step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {told:g} Hz")
+    return Timing(
+        step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {told:g} Hz"
+    )

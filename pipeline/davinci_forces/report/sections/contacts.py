@@ -125,7 +125,7 @@ def reason(entry: LogEntry, track: Track | None) -> str:
     if entry.role == "friction":
         return "a friction log gives friction maps; its external effort is not tracked"
     if entry.role == "weight" and entry.weight is None:
-        return "its weight is not described; write weight = { moves_with = ..., position = ... }, and its mass is estimated"
+        return "its mass is not estimated; write weight = { moves_with = ..., position = ... } in study.toml"
     if track is None:
         return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:
