@@ -17,7 +17,7 @@ from davinci_forces.study.names import (
     IN_DEGREES,
     Numbered,
     is_time,
-    numbered,
+    joint_groups,
     psm_joint,
     stated_unit,
     symbol_of,
@@ -63,7 +63,7 @@ class Holding:
         """The joints with positions, in the order of `ranges`."""
         return sorted({meaning.joint for meaning in self.meanings.values() if meaning.symbol in POSITIONS})
 
-    def renumbered(self, joints: Sequence[int]) -> "Holding":
+    def with_joints(self, joints: Sequence[int]) -> "Holding":
         """The same with other numbers of the joints: `joints[k]` instead of k."""
         order = sorted(range(len(self.ranges)), key=lambda i: joints[self.joints_of_ranges()[i]])
         return replace(
@@ -174,7 +174,7 @@ def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
 def by_numbers(channels: Sequence[Channel]) -> Holding:
     """Assign joints by the number or label of a channel among those of one name: `q1`, `effort[outer_yaw]`."""
     groups: dict[str, Numbered] = {}
-    for group in numbered(channels):
+    for group in joint_groups(channels):
         groups.setdefault(group.symbol, group)
     if "q" not in groups or not groups.keys() & {"tau", "i"}:
         return Holding()

@@ -118,7 +118,7 @@ def symbol_of(words: Sequence[str]) -> str:
     return next((symbol for symbol, telling in SIGNAL_WORDS.items() if set(telling) & set(words)), "")
 
 
-def numbered(channels: Sequence[Channel]) -> list[Numbered]:
+def joint_groups(channels: Sequence[Channel]) -> list[Numbered]:
     """Group channels by all of their name but the joint's number or label; of one quantity, measured signals first."""
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:

@@ -26,7 +26,9 @@ from davinci_forces.study.roles import Recording, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
-MAX_TURN = 6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
+MAX_ANGLE_DRIVE = (
+    6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
+)
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
 
@@ -169,7 +171,7 @@ def _named_as(robot: Robot, drawn: Sequence[DraftLog]) -> list[DraftLog]:
     """Assign channels to the robot's joints of the same names as their labels, in whatever order the log has them."""
     joints = {joint.name: k for k, joint in enumerate(robot.joints)}
     return [
-        replace(draft, guess=draft.guess.renumbered([joints[label] for label in draft.guess.labels]))
+        replace(draft, guess=draft.guess.with_joints([joints[label] for label in draft.guess.labels]))
         if draft.guess.labels and set(draft.guess.labels) <= joints.keys() else draft
         for draft in drawn
     ]  # fmt: skip
@@ -312,7 +314,7 @@ class _Writer:
     def _unknown_units(self) -> set[str]:
         """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
         wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
-                if max(-low, high) > MAX_TURN}  # fmt: skip
+                if max(-low, high) > MAX_ANGLE_DRIVE}  # fmt: skip
         units = {channel.name: stated_unit(channel) for channel in self.draft.log.channels}
         return {
             name for name, m in self.draft.guess.meanings.items()

@@ -24,7 +24,7 @@ SIZES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # [s]
 RATIOS = {("dq", "deg/s"): 180 / math.pi, ("q", "deg"): math.pi / 180}  # velocity over slope where one is in degrees
 
 
-class Slope(NamedTuple):
+class VelocityRatio(NamedTuple):
     """Velocity over the slope of the position, as the median of the joints that move, and their correlation."""
 
     correlation: float
@@ -83,14 +83,16 @@ def named_time(log: Log) -> str:
     return next((channel.name for channel in log.channels if channel.kind == "number" and is_time(channel)), "")
 
 
-def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> Slope | None:
+def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> VelocityRatio | None:
     """Compare velocities (N,) with the slopes of positions (N,), per sample or per second of `t`; None if unrelated."""
     moves = columns.moving_positions([q for q, _ in pairs]) if pairs and len(pairs[0][0]) else ()
     both = [columns.derivative(*pairs[i], t) for i in moves]
-    alike = [Slope(*pair) for pair in both if pair[0] >= MIN_CORRELATION]
+    alike = [VelocityRatio(*pair) for pair in both if pair[0] >= MIN_CORRELATION]
     if not alike:
         return None
-    return Slope(*(float(np.median([getattr(slope, name) for slope in alike])) for name in Slope._fields))
+    return VelocityRatio(
+        *(float(np.median([getattr(slope, name) for slope in alike])) for name in VelocityRatio._fields)
+    )
 
 
 def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing:
@@ -100,14 +102,14 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
     """
     per_sample = slope_of(pairs)
     if has_clock(log):
-        return _checked_clock(log, samples, pairs, per_sample)
+        return _timing_of_format(log, samples, pairs, per_sample)
     numbers = [c for c in log.channels if c.kind == "number" and not c.derived and c.name in samples]
     times = [channel for channel in numbers if is_time(channel) and _rises(samples[channel.name])]
     if unnamed and not times:
         first = columns.first_rising_column([samples[channel.name] for channel in numbers])
         times = [numbers[first]] if first is not None else []
-    judged = [_judged(channel, samples[channel.name], pairs, unnamed) for channel in times]
-    known = [timing for timing in judged if timing is not None]
+    timings = [_timing_by(channel, samples[channel.name], pairs, unnamed) for channel in times]
+    known = [timing for timing in timings if timing is not None]
     if known:
         return next((timing for timing in known if timing.time), known[0])
     if per_sample is not None:
@@ -125,7 +127,7 @@ def _step(t: Array) -> float:
     return float(t[-1] - t[0]) / (len(t) - 1)
 
 
-def _judged(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing | None:
+def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing | None:
     """The times of a channel in the unit that it states or that its values tell; None where it only counts samples."""
     stated = channel.unit or unit_of_name(channel.name)
     unit = {"s": 1.0} | SHORT_TIMES
@@ -150,23 +152,23 @@ def _judged(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], un
     name = next((name for name, s in SIZES.items() if s == seconds), "")
     what = f"{shape} ({rate:.6g} Hz if it is in seconds)" if unnamed and not how else f"{shape}, {rate:.6g} Hz"
     timing = Timing(channel.name, seconds, what + (f"; in {name}{how}" if how else ""), step=_step(t) * seconds)
-    return _compared(timing, slope and slope._replace(ratio=slope.ratio * seconds), rate, channel.name)
+    return _timing_agreed(timing, slope and slope._replace(ratio=slope.ratio * seconds), rate, channel.name)
 
 
-def _compared(timing: Timing, slope: Slope | None, rate: float, name: str) -> Timing:
+def _timing_agreed(timing: Timing, slope: VelocityRatio | None, rate: float, name: str) -> Timing:
     """Times as they are where velocities agree; in degrees what that explains; else no times, and both rates said."""
     if slope is None or slope.agrees(1.0):
         return timing
     units = tuple(key for key, ratio in RATIOS.items() if slope.agrees(ratio))
     if units:
         return Timing(**vars(timing) | {"units": units})
-    told = columns.round_rate(slope.ratio * rate)
-    clash = f"by {name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {told:g} Hz"
-    return Timing(missing=f"{clash}: write rate = {told:g}, or time = {name!r}", step=timing.step)
+    fitted = columns.round_rate(slope.ratio * rate)
+    clash = f"by {name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
+    return Timing(missing=f"{clash}: write rate = {fitted:g}, or time = {name!r}", step=timing.step)
 
 
-def _checked_clock(
-    log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], slope: Slope | None
+def _timing_of_format(
+    log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], slope: VelocityRatio | None
 ) -> Timing:
     """The clock of a format, with a remark where the velocities tell another rate."""
     t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
@@ -174,10 +176,10 @@ def _checked_clock(
     timing = Timing(step=step)
     if not step or slope is None or slope.agrees(1 / step):
         return timing
-    told = columns.round_rate(slope.ratio)
+    fitted = columns.round_rate(slope.ratio)
     unit = next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None)
     if unit:
         return Timing(step=step, units=(unit,))
     return Timing(
-        step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {told:g} Hz"
+        step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-SMOOTHED = 9  # samples of the mean that is taken of every signal, for noise of single samples tells nothing
+SAMPLES_SMOOTHED = 9  # samples of the mean that is taken of every signal, for noise of single samples tells nothing
 MAX_POINTS = 20_000  # of a course; a longer recording is thinned
 REVERSAL = 0.02  # share of the highest speed within which friction reverses
 ITERATIONS = 20  # of reweighting; the weights change by less than a per cent after 10
@@ -30,8 +30,8 @@ class Course(NamedTuple):
 
 def smoothed_course(q: Array, dq: Array, tau: Array, step: float) -> Course:
     """Smooth and thin the signals (N,) of a joint, sampled every `step` seconds."""
-    mean = np.ones(SMOOTHED) / SMOOTHED
-    smooth = [np.convolve(x, mean, "valid") if len(x) > 2 * SMOOTHED else x for x in (q, dq, tau)]
+    mean = np.ones(SAMPLES_SMOOTHED) / SAMPLES_SMOOTHED
+    smooth = [np.convolve(x, mean, "valid") if len(x) > 2 * SAMPLES_SMOOTHED else x for x in (q, dq, tau)]
     ddq = np.gradient(smooth[1], step) if len(smooth[1]) > 1 else np.zeros_like(smooth[1])
     every = -(-len(smooth[0]) // MAX_POINTS)
     return Course(smooth[0][::every], smooth[1][::every], ddq[::every], smooth[2][::every])
@@ -65,8 +65,8 @@ def has_outliers(course: Course) -> bool:
 def unexplained_share(course: Course, references: Sequence[Course]) -> float:
     """Deviation of the effort from a model fitted to other courses of the joint, as a share of the effort's own.
 
-    Only where the other courses have been, in position and speed; 0 where that is less than half of the course, or
-    where their own efforts deviate by half as much: a model that does not describe them judges no other.
+    Only samples count whose position and speed the other courses reached. The share is 0 where these are less than
+    half of the course. It is also 0 where the model leaves half as much of the other courses themselves.
     """
     low, high = min(float(r.q.min()) for r in references), max(float(r.q.max()) for r in references)
     speed = max(float(np.abs(reference.dq).max()) for reference in references)
