@@ -28,15 +28,19 @@ def name(lab, **channels):  # noqa: F811
     for key, channel in channels.items():
         quantity = "time" if key == "time" else f"hand_roll.{key}"
         old = next(line for line in tail.splitlines() if line.replace('"', "").startswith(f"{quantity} ="))
-        tail = tail.replace(old, f'{old.partition("=")[0]}= {channel}')
+        tail = tail.replace(old, f"{old.partition('=')[0]}= {channel}")
     (lab / "study.toml").write_text(head + tail)
 
 
 @pytest.mark.parametrize(
     ("columns", "time", "q"),
-    [("time / ms,q / deg", "time / ms", "q / deg"), ("time_ms,q_deg", "time_ms", "q_deg"), ("t [ms],q [deg]", "t [ms]", "q [deg]"),
-     ("t (ms),q (deg)", "t (ms)", "q (deg)")],
-)  # fmt: skip
+    [
+        ("time / ms,q / deg", "time / ms", "q / deg"),
+        ("time_ms,q_deg", "time_ms", "q_deg"),
+        ("t [ms],q [deg]", "t [ms]", "q [deg]"),
+        ("t (ms),q (deg)", "t (ms)", "q (deg)"),
+    ],
+)
 def test_units_in_names_come_to_si(lab, columns, time, q):  # noqa: F811
     heads = (lab / "bad.csv").read_text().splitlines()[0].split(",")
     scaled(lab, ",".join([*columns.split(","), *heads[2:]]), 1e3, np.degrees(1.0))
@@ -60,13 +64,20 @@ def test_the_study_has_the_last_word_on_a_word_in_a_name(lab):  # noqa: F811
 
 def test_nanoseconds_since_1970_are_no_seconds(lab):  # noqa: F811
     """Without a header, too."""
+
     def stamp(line):
         t, *cells = line.split(",")
         return ",".join([str(1_792_065_599_800_000_000 + round(1e9 * float(t))), *cells])
 
     edit(lab, lambda lines: [stamp(line) for line in lines[1:]])
     heads = (lab / "good.csv").read_text().splitlines()[0].split(",")
-    name(lab, time="0", q=str(heads.index("hand_roll.q")), dq=str(heads.index("hand_roll.dq")), tau=str(heads.index("hand_roll.tau")))
+    name(
+        lab,
+        time="0",
+        q=str(heads.index("hand_roll.q")),
+        dq=str(heads.index("hand_roll.dq")),
+        tau=str(heads.index("hand_roll.tau")),
+    )
     call("ingest", lab)
     good, bad = (davinci_forces.read(lab, "Recording", log=log) for log in ("good", "bad"))
     np.testing.assert_allclose(bad["t"], good["t"], atol=1e-6)
