@@ -70,7 +70,7 @@ class DraftLog:
 
 def is_folder(path: Path) -> bool:
     """Whether a path is a folder of logs; a ROS 2 bag is a folder, too, but one log."""
-    return path.is_dir() and not (path / BAG).is_file()
+    return path.is_dir() and not any(any(path.glob(pattern)) for pattern in BAG)
 
 
 def logs_in(paths: Sequence[Path]) -> list[Path]:
