@@ -21,7 +21,6 @@ from davinci_forces.study.names import (
     psm_joint,
     stated_unit,
     symbol_of,
-    unit_of_name,
     words_of,
 )
 from davinci_forces.study.timing import MAX_CHANNELS, Timing, has_clock, named_time, samples_of, timing_of
@@ -32,7 +31,7 @@ POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "
 
 @dataclass(frozen=True)
 class Meaning:
-    """What one channel holds: a symbol of a joint, counted from 0, the reason, and the unit that the name states."""
+    """What one channel holds: a symbol of a joint, counted from 0, the reason, and the unit that a recorder is known to use."""
 
     symbol: str
     joint: int
@@ -142,8 +141,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
             continue
         symbol = _side(symbol, words, channel, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
-            unit = "" if stated_unit(channel) else unit_of_name(channel.name)
-            meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name", unit)
+            meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name")
     return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
 
 
@@ -191,7 +189,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
                 joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
             else:
                 continue
-            unit = "" if units[name] else unit_of_name(name) or _usual(symbol, group.words)
+            unit = "" if units[name] else _usual(symbol, group.words)
             meanings[name] = Meaning(symbol, joint, reason, unit)
     meanings = _with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())

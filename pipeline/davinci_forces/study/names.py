@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from davinci_forces.logs.log import Channel, unit_in
+from davinci_forces.logs.log import Channel
 from davinci_forces.maths.units import canonical, measures
 
 # Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
@@ -45,14 +45,6 @@ TIME_QUALIFIERS = {
     "field",
     "x",
 }
-# Units in names, besides those of `maths/units`: by their lower case.
-UNIT_WORDS = {
-    "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "rads": "rad", "radians": "rad",
-    "mm": "mm", "um": "um", "ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us", "micros": "us",
-    "ns": "ns", "nsec": "ns", "nanos": "ns", "ma": "mA", "nm": "N m", "mnm": "mN m", "mn": "mN", "rpm": "rpm",
-    "dps": "deg/s", "rps": "rev/s",
-}  # fmt: skip
-SHORT_TIMES = {"us": 1e-6, "ns": 1e-9, "µs": 1e-6}  # [s] units of time that a study gives as a scale
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 PSM_JOINTS = {
@@ -76,24 +68,6 @@ def words_of(name: str) -> list[str]:
     return [word.lower() for word in WORD.findall(name)]
 
 
-def unit_of_name(name: str) -> str:
-    """The unit in a name: `time / ms`, `q [deg]`, `q (deg)`, `q_deg_1`, `vel_deg_s`; else "".
-
-    Single letters count in brackets and after a stroke only.
-    """
-    rate = "/".join(name.split("/")[-2:]).split()[-1:]
-    for written in (unit_in(name), *rate, re.split(r"[/\s]", name.strip())[-1] if "/" in name else ""):
-        if written and (measures(written) or written in SHORT_TIMES):
-            return canonical(written)
-    parts = re.split(r"[^A-Za-z]+", unit_in(name) or name)
-    for k, part in enumerate(parts):
-        if unit := UNIT_WORDS.get(part.lower(), ""):
-            after = [following.lower() for following in parts[k + 1 : k + 3]]
-            per_second = after[:1] == ["s"] or after == ["per", "s"] or after == ["per", "sec"]
-            return f"{unit}/s" if per_second and unit in ("deg", "rad", "mm") else unit
-    return ""
-
-
 def stated_unit(channel: Channel) -> str:
     """The unit that the log states; the label of a joint in brackets, as in `q[0]`, is none."""
     return "" if channel.name.endswith(f"[{channel.unit}]") and not measures(canonical(channel.unit)) else channel.unit
@@ -105,7 +79,7 @@ def is_time(channel: Channel) -> bool:
     words = words_of(re.split(r"[/.]", name)[-1])
     if words == ["x", "value"]:  # LabVIEW
         return True
-    words = [word for word in words if word not in UNIT_WORDS and word != "s"] or words
+    words = [word for word in words if word != "s" and not measures(word)] or words
     return bool(set(words) & TIME_WORDS) and set(words) <= TIME_WORDS | TIME_QUALIFIERS
 
 

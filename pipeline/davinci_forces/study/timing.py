@@ -11,7 +11,7 @@ from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures, size
-from davinci_forces.study.names import SHORT_TIMES, is_time, unit_of_name
+from davinci_forces.study.names import is_time
 
 MAX_SAMPLES = 200_000  # samples of a log that are read
 MAX_CHANNELS = 400  # channels of a log whose samples are read
@@ -129,9 +129,7 @@ def _step(t: Array) -> float:
 
 def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing | None:
     """The times of a channel in the unit that it states or that its values tell; None where it only counts samples."""
-    stated = channel.unit or unit_of_name(channel.name)
-    unit = {"s": 1.0} | SHORT_TIMES
-    known = size(stated) if measures(stated) == "time" else unit.get(stated, 0.0)
+    known = size(channel.unit) if measures(channel.unit) == "time" else 0.0
     strict = np.concatenate([[True], np.diff(t) > 0])
     slope = slope_of([(q[strict], dq[strict]) for q, dq in pairs if len(q) == len(t)], t[strict])
     shape = "increases throughout" if strict.all() else "increases"
