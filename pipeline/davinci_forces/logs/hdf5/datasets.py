@@ -68,7 +68,8 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
         log.facts[name] = "".join(map(chr, node[()].T.ravel()[:200].tolist()))
     elif h5py.check_ref_dtype(node.dtype) is h5py.Reference:
         pattern = "{}{{{}}}" if _matlab_class(node) == "cell" else "{}({})"
-        for number, reference in enumerate(node[()].T.ravel()[:MAX_REFERENCES] if deep else (), start=1):
+        references = np.asarray(node[()], object).T.ravel()[:MAX_REFERENCES]  # a scalar is no array
+        for number, reference in enumerate(references if deep else (), start=1):
             if reference:
                 yield from _arrays(file, file[reference], pattern.format(name, number), deep - 1, log)
     elif node.dtype.kind in "SO" and node.size == 1:

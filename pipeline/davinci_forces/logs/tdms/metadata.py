@@ -71,7 +71,7 @@ class Objects:
             self._index(path, take.number("I"), take)
             for _ in range(take.number("I")):
                 name, value = take.text(), take.value(take.number("I"))
-                if properties.get(name, value) != value:
+                if properties.get(name) not in (None, "", value):
                     self.revised.setdefault(path, {}).setdefault(name, properties[name])
                 properties[name] = value
 

@@ -40,7 +40,7 @@ def first_rising_column(columns: Sequence[Array]) -> int | None:
 
 def moving_positions(positions: Sequence[Array]) -> tuple[int, ...]:
     """Indices of the positions (N,) whose range exceeds a share of the widest one, and the noise at rest."""
-    ranges = [float(np.ptp(q)) for q in positions]
+    ranges = [float(np.ptp(q)) if len(q) else 0.0 for q in positions]
     return tuple(i for i, width in enumerate(ranges) if width >= max(MIN_RANGE_SHARE * max(ranges), MIN_RANGE_MOVING))
 
 
