@@ -62,6 +62,8 @@ def examples(all_texts: bool = False) -> Iterator[Example]:
     structs = {"log": {"arm": {"q": x, "name": "left"}}, "ts": {"Time": x[:, 0], "Data": x}}
     for packed_too in (True, False):
         yield Example(f"mat_structs_{packed_too}", {"log.mat": array_writers.matlab(structs, packed_too)})
+    objects = Path(__file__).with_name("objects.mat").read_bytes()
+    yield Example("mat_objects", {"log.mat": objects})
     yield Example("mat_73_structs", {"log.mat": array_writers.matlab_73(structs)})
     messages = [message for i, row in enumerate(x) for message in _messages(0.01 * i, row)]
     with tempfile.TemporaryDirectory() as home:

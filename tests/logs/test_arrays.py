@@ -2,11 +2,13 @@
 
 import sys
 from io import BytesIO
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pyarrow as pa
 import pytest
+import scipy.io.matlab
 from numpy.testing import assert_array_equal
 from scipy.io import savemat
 
@@ -17,6 +19,8 @@ from tests.logs.reading import read
 ROWS = 30
 T = 0.01 * np.arange(ROWS)
 Q = np.arange(3.0 * ROWS).reshape(ROWS, 3)
+OBJECTS = Path(__file__).with_name("objects.mat").read_bytes()
+OBJECT_Q = np.arange(60.0).reshape(20, 3)
 MATLAB = pytest.mark.parametrize("write", [matlab, matlab_73])
 
 
@@ -124,6 +128,66 @@ def test_what_that_line_of_matlab_saves_is_read_with_its_clock():
     log, samples = read(matlab({"ts": {"Time": T[:, None], "Data": Q}}), "ts.mat")
     assert_array_equal(samples["ts/Data[2]"], Q[:, 2])
     assert log.find("ts/Data[2]").time == "ts/Time"
+
+
+def test_objects_of_matlab_are_read_beside_its_variables():
+    """Written by PyPI's mat-io, which is a witness of its own: timeseries, a table, a timetable, a string, a struct."""
+    log, samples = read(OBJECTS, "log.mat")
+    assert log.warnings == []
+    assert not any("workspace" in name for name in names(log))
+    for series in ("ts", "uniform", "inner/arm"):  # a uniform one stores its start and its increment alone
+        assert_array_equal(np.column_stack([samples[f"{series}/Data[{i}]"] for i in range(3)]), OBJECT_Q)
+        assert log.find(f"{series}/Data[0]").time == f"{series}/Time"
+    np.testing.assert_allclose(samples["ts/Time"], 0.01 * np.arange(20), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(samples["uniform/Time"], 0.5 + 0.01 * np.arange(20), rtol=0, atol=1e-15)
+    assert_array_equal(samples["x[2]"], OBJECT_Q[:, 2])
+    for table in ("T", "TT"):
+        assert_array_equal(samples[f"{table}/q"], OBJECT_Q[:, 0])
+        assert_array_equal(samples[f"{table}/i"], OBJECT_Q[:, 1])
+    np.testing.assert_allclose(samples["TT/Time"], 0.01 * np.arange(20), rtol=0, atol=1e-15)
+    assert (log.find("TT/q").time, log.find("TT/Time").kind, log.find("T/q").time) == ("TT/Time", "time", "")
+    assert log.facts["s"] == "left"
+
+
+def test_an_object_that_cannot_be_read_is_named_and_the_variables_are_read():
+    """The place of the properties in the header is erased."""
+    log, samples = read(OBJECTS[:116] + bytes(8) + OBJECTS[124:], "log.mat")
+    assert set(names(log)) == {"t", "x[0]", "x[1]", "x[2]", "inner/x[0]", "inner/x[1]", "inner/x[2]"}
+    assert_array_equal(samples["x[0]"], OBJECT_Q[:, 0])
+    assert [warning.partition(" is a MATLAB object")[0] for warning in log.warnings] == [
+        "ts", "uniform", "T", "TT", "s", "inner/arm", "odd",
+    ]  # fmt: skip
+    assert not any("damaged" in warning for warning in log.warnings)
+
+
+def test_functions_are_no_channels():
+    file = Path(scipy.io.matlab.__file__).with_name("tests") / "data" / "some_functions.mat"
+    if not file.exists():
+        pytest.skip("scipy is installed without its tests")
+    with pytest.raises(BadLog, match="sqr is a function of MATLAB") as refused:
+        read(file.read_bytes(), "log.mat")
+    assert "workspace" not in str(refused.value)
+
+
+def test_text_and_sparse_matrices_of_versions_4_and_5_are_what_they_are():
+    import scipy.sparse
+
+    for version in ("4", "5"):
+        file = BytesIO()
+        savemat(file, {"t": T, "who": "left", "s": scipy.sparse.csc_array(Q)}, format=version)
+        log, samples = read(file.getvalue(), "log.mat")
+        assert log.facts["who"] == "left"
+        assert_array_equal(samples["s[1]"], Q[:, 1])
+
+
+def test_a_scalar_reference_is_followed():
+    file = BytesIO()
+    with h5py.File(file, "w") as hdf:
+        hdf["q"] = Q[:, 0]
+        hdf.create_dataset("best", data=hdf["q"].ref, dtype=h5py.ref_dtype)
+        hdf.create_dataset("none", data=h5py.Reference(), dtype=h5py.ref_dtype)
+    _, samples = read(file.getvalue(), "log.h5")
+    assert_array_equal(samples["best(1)"], Q[:, 0])
 
 
 def test_version_4_is_read():

@@ -1,6 +1,8 @@
 """Read the variables of a MATLAB file as arrays, with scipy, or with h5py for version 7.3."""
 
-from collections.abc import Iterator, Sequence
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +15,22 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
 from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.mat.objects import (
+    FUNCTION,
+    NUMBERS,
+    OPAQUE,
+    SPARSE,
+    TEXT,
+    Element,
+    MatlabObject,
+    Objects,
+    elements,
+    is_object,
+    seconds,
+    text_of,
+    uniform_times,
+)  # fmt: skip
 
-NUMBER_CLASSES = {"double", "single", "logical", *(f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64))}
 MAX_ELEMENTS = 1000  # of a struct array or a cell array
 
 
@@ -35,7 +51,7 @@ def open_in_child(path: Path, options: Options) -> Log:
     arrays = list(_of_hdf5(path, log) if header.startswith("MATLAB 7.3") else _of_matlab(path, log))
     take_in(log, with_clocks(arrays, log.facts))
     if not log.channels:
-        names = ", ".join(array.name for array in arrays) or "nothing that is read"
+        names = "; ".join([", ".join(array.name for array in arrays) or "nothing that is read", *log.warnings])
         raise BadLog(f"{path}: it holds no variable of samples; it has {names}")
     return log
 
@@ -49,12 +65,23 @@ def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
 
 
 def _of_matlab(path: Path, log: Log) -> Iterator[NamedArray]:
-    for name, shape, kind in whosmat(path, appendmat=False):
-        if kind in NUMBER_CLASSES:
-            yield NamedArray(name, Variable(path, name, shape))
+    with open_file(path) as file:
+        is_old = 0 in file.read(4)  # version 4 begins with numbers, later ones with text
+    variables = elements(path) if not is_old else [
+        Element(name, TEXT if kind == "char" else NUMBERS[0], shape)
+        for name, shape, kind in whosmat(path, appendmat=False)
+    ]  # fmt: skip
+    reader = _Reader(log, Objects(path))
+    for variable in variables:
+        if variable.kind in NUMBERS or variable.kind == SPARSE:
+            yield NamedArray(variable.name, Variable(path, variable.name, variable.shape))
+        elif variable.kind == FUNCTION:
+            log.warnings.append(f"{variable.name} is a function of MATLAB, which holds no samples, and is left out")
+        elif variable.kind == OPAQUE:
+            yield from reader.objects_of(variable)
         else:
-            value = loadmat(path, appendmat=False, variable_names=[name]).get(name)
-            yield from _arrays(name, value, MAX_DEPTH, log)
+            value = loadmat(path, appendmat=False, variable_names=[variable.name])[variable.name]
+            yield from reader.arrays(variable.name, value, MAX_DEPTH)
 
 
 @dataclass
@@ -82,21 +109,89 @@ class Variable:
         return values[part]
 
 
-def _arrays(name: str, value: Any, deep: int, log: Log) -> Iterator[NamedArray]:
-    """List the arrays of a struct or a cell, by their names in MATLAB."""
-    if isinstance(value, MatlabOpaque | MatlabFunction) or not isinstance(value, np.ndarray):
-        log.warnings.append(matlab_object(name))
-    elif value.dtype.kind in "US":
-        log.facts[name] = "".join(map(str, value.ravel()[:1]))[:200]
-    elif value.dtype.names or value.dtype.kind == "O":
-        cell, many = not value.dtype.names, value.size > 1
-        for number, element in enumerate(value.ravel(order="F")[:MAX_ELEMENTS] if deep else (), start=1):
-            called = f"{name}{{{number}}}" if cell else f"{name}({number})" if many else name
-            fields = {called: element} if cell else {f"{called}/{key}": element[key] for key in value.dtype.names or ()}
-            for key, inner in fields.items():
-                yield from _arrays(key, inner, deep - 1, log)
-    elif value.size:
-        yield NamedArray(name, value)
+@dataclass(frozen=True)
+class _Reader:
+    """Lists the arrays of structs, cells and objects, by their names in MATLAB."""
+
+    log: Log
+    objects: Objects
+
+    def arrays(self, name: str, value: Any, deep: int) -> Iterator[NamedArray]:
+        """List the arrays of a value."""
+        if isinstance(value, MatlabOpaque):
+            yield from self._objects(name, value[0]["s2"], lambda: self.objects.read(value[0]["arr"]), deep)
+        elif is_object(value):
+            yield from self._objects(name, "", lambda: self.objects.read(value), deep)
+        elif value is None:  # scipy's empty struct
+            return
+        elif isinstance(value, MatlabFunction) or not isinstance(value, np.ndarray):
+            self.log.warnings.append(f"{name} is neither numbers nor text, and is left out")
+        elif value.dtype.kind in "US":
+            self.log.facts[name] = "".join(map(str, value.ravel()[:1]))[:200]
+        elif value.dtype.names or value.dtype.kind == "O":
+            cell, many = not value.dtype.names, value.size > 1
+            for number, element in enumerate(value.ravel(order="F")[:MAX_ELEMENTS] if deep else (), start=1):
+                called = f"{name}{{{number}}}" if cell else f"{name}({number})" if many else name
+                keys = value.dtype.names or ()
+                fields = {called: element} if cell else {f"{called}/{key}": element[key] for key in keys}
+                for key, inner in fields.items():
+                    yield from self.arrays(key, inner, deep - 1)
+        elif value.size:
+            yield NamedArray(name, value)
+
+    def objects_of(self, variable: Element) -> Iterator[NamedArray]:
+        """List the arrays of a variable that holds objects."""
+        name, kind = variable.name, variable.class_name
+        yield from self._objects(name, kind, lambda: self.objects.of_element(variable), MAX_DEPTH)
+
+    def _objects(self, name: str, kind: str, read: Callable[[], list[MatlabObject]], deep: int) -> Iterator[NamedArray]:
+        """List the arrays of objects, or say why they cannot be read: their layout is not documented."""
+        try:
+            objects = read() if deep else []
+            for number, one in enumerate(objects, start=1):
+                yield from list(self._object(f"{name}({number})" if len(objects) > 1 else name, one, deep - 1))
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, struct.error, zlib.error) as error:
+            self.log.warnings.append(f"{matlab_object(name, kind)} ({error})")
+
+    def _object(self, name: str, one: MatlabObject, deep: int) -> Iterator[NamedArray]:
+        properties = one.properties
+        if one.class_name == "string":
+            self.log.facts[name] = text_of(properties["any"])[:200]
+        elif one.class_name in ("duration", "datetime"):
+            yield NamedArray(name, seconds(properties["millis" if one.class_name == "duration" else "data"]), "s")
+        elif one.class_name == "timetable":
+            yield from self._timetable(name, properties["any"].flat[0], deep)
+        elif one.class_name == "table":
+            units = properties["props"].flat[0]["VariableUnits"]
+            yield from self._columns(name, properties["data"], properties["varnames"], units, deep)
+        else:
+            info = properties.get("TimeInfo")
+            [about] = self.objects.read(info) if is_object(info) else [MatlabObject("", {})]
+            times = uniform_times(properties, about.properties)
+            for key, value in (properties | ({} if times is None else {"Time": times})).items():
+                yield from self.arrays(f"{name}/{key}", value, deep)
+
+    def _timetable(self, name: str, content: Any, deep: int) -> Iterator[NamedArray]:
+        """List the columns of a timetable on its row times, which may be a start and a step."""
+        times, rows = content["rowTimes"], int(content["numRows"].flat[0])
+        if times.dtype.names:
+            step = times.flat[0]
+            rate = float(step["sampleRate"].flat[0]) if step["specifiedAsRate"].flat[0] else 0.0
+            [origin] = self.arrays("", step["origin"], deep)
+            interval = [1 / rate] if rate else [float(a.data[0]) for a in self.arrays("", step["stepSize"], deep)]
+            row_times = float(origin.data[0]) + interval[0] * np.arange(rows)
+        else:
+            [stored] = self.arrays("", times, deep)
+            row_times = np.asarray(stored.data)
+        yield NamedArray(f"{name}/Time", row_times, "s")
+        for array in self._columns(name, content["data"], content["varNames"], content["varUnits"], deep):
+            yield replace(array, time=f"{name}/Time") if array.rows == rows else array
+
+    def _columns(self, name: str, data: Any, names: Any, units: Any, deep: int) -> Iterator[NamedArray]:
+        written = [str(unit.flat[0]) if unit.size else "" for unit in units.ravel()] or [""] * data.size
+        for called, column, unit in zip(names.ravel(), data.ravel(), written, strict=True):
+            for array in self.arrays(f"{name}/{called.flat[0]}", column, deep):
+                yield replace(array, unit=array.unit or unit)
 
 
 # Names of times and values in structs that MATLAB makes of a timeseries, and Simulink of its logs.
@@ -115,6 +210,6 @@ def with_clocks(arrays: Sequence[NamedArray], facts: dict[str, str]) -> list[Nam
                 clock |= dict.fromkeys(same, array.name)
     units = {a.name: facts.get(f"{a.name.removesuffix('/Data')}/DataInfo/Units", "") for a in arrays}
     return [
-        replace(a, time=clock.get(a.name, ""), unit="s" if a.name in clock.values() else a.unit or units[a.name])
+        replace(a, time=clock.get(a.name, a.time), unit="s" if a.name in clock.values() else a.unit or units[a.name])
         for a in arrays
     ]
