@@ -10,6 +10,7 @@ import pyarrow as pa
 import pytest
 import scipy.io.matlab
 from numpy.testing import assert_array_equal
+from pyarrow import parquet
 from scipy.io import savemat
 
 from davinci_forces.errors import BadLog
@@ -275,6 +276,51 @@ def test_columns_of_whole_numbers_and_flags_are_numbers(kind):
     assert_array_equal(samples["n"], np.arange(ROWS))
     assert_array_equal(samples["on"], [1.0, 0.0] * (ROWS // 2))
     assert_array_equal(samples["f"], np.float32(T).astype(float))
+
+
+@TABLES
+@pytest.mark.parametrize(
+    "kind_of_list", [pa.list_(pa.float32(), 3), pa.list_(pa.float32()), pa.large_list(pa.float64())]
+)
+def test_lists_of_one_length_are_columns_and_a_missing_list_is_missing(kind, kind_of_list):
+    lists = pa.array([*Q[:4].tolist(), None, *Q[5:].tolist()], kind_of_list)
+    log, samples = read(arrow(kind, {"t": T, "observation.state": lists}), f"log.{kind}")
+    assert names(log) == ["t", *(f"observation.state[{i}]" for i in range(3))]
+    for i in range(3):
+        assert_array_equal(samples[f"observation.state[{i}]"], np.where(np.arange(ROWS) == 4, np.nan, Q[:, i]))
+    assert (log.nulls["observation.state[1]"], log.nans["observation.state[1]"]) == (1, 0)
+
+
+@TABLES
+def test_lists_of_other_lengths_are_refused_only_where_they_are_read(kind):
+    log = opened(arrow(kind, {"t": T, "odd": pa.array([[1.0], *[[1.0, 2.0]] * (ROWS - 1)])}), f"log.{kind}")
+    assert len(next(log.blocks(["t"]))["t"]) == ROWS
+    with pytest.raises(BadLog, match="lists of 'odd' have different lengths"):
+        list(log.blocks(["odd[0]"]))
+
+
+@TABLES
+def test_episodes_of_lerobot_follow_one_another_with_a_gap(kind):
+    episodes = np.repeat([0, 1, 2], 10)
+    t = np.float32(np.tile(0.02 * np.arange(10), 3))
+    columns = {"timestamp": t, "episode_index": episodes, "q": Q[:, 0]}
+    log, samples = read(arrow(kind, columns), f"log.{kind}")
+    alone = opened(arrow(kind, columns), f"log.{kind}").blocks(["timestamp"])
+    assert_array_equal(np.concatenate([block["timestamp"] for block in alone]), samples["timestamp"])
+    assert (log.time, log.find("timestamp").unit) == ("timestamp", "s")
+    np.testing.assert_allclose(samples["timestamp"], t + (0.18 + 1.0) * episodes, rtol=0, atol=1e-6)
+    going_on = {"timestamp": T, "episode_index": episodes}
+    assert_array_equal(read(arrow(kind, going_on), f"log.{kind}")[1]["timestamp"], T)
+
+
+def test_a_page_of_parquet_whose_checksum_is_wrong_is_refused():
+    file = BytesIO()
+    parquet.write_table(pa.table({"q": T}), file, write_page_checksum=True, compression="none", use_dictionary=False)
+    content = file.getvalue()
+    assert_array_equal(read(content, "log.parquet")[1]["q"], T)
+    at = content.index(np.float64(T[7]).tobytes())
+    with pytest.raises(BadLog, match=r"(?i)crc|checksum"):
+        read(content[:at] + b"\1" + content[at + 1 :], "log.parquet")
 
 
 def opened(content: bytes, name: str):

@@ -1,7 +1,8 @@
 """Read the columns of a Parquet or Feather file in batches, with pyarrow."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from pyarrow import feather, ipc, parquet
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
+from davinci_forces.logs.arrays import MAX_COLUMNS
 from davinci_forces.logs.cells import absent, integers, numbers
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.timeline import UNIX_EPOCH, moment
@@ -19,6 +21,13 @@ from davinci_forces.maths.arrays import Array
 BATCH_ROWS = 1 << 14  # rows of a batch
 BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
 MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, above which it is mapped instead of read into memory
+PARQUET = {"pre_buffer": False, "buffer_size": BUFFER, "page_checksum_verification": True}  # else it holds row groups
+LISTS = (pa.types.is_fixed_size_list, pa.types.is_list, pa.types.is_large_list)
+EPISODES = (
+    "timestamp",
+    "episode_index",
+)  # columns of LeRobot: times [s] that begin anew, and the number of the episode
+EPISODE_GAP = 1.0  # [s] between episodes: longer than any sampling time of a robot, so that none is joined to the next
 UNIT_KEYS = (b"unit", b"units")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
@@ -36,19 +45,39 @@ def open_in_child(path: Path, options: Options) -> Log:
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a unique name")
-    names = zip(unique(schema.names), schema, strict=True)
-    channels = tuple(Channel(name, _unit(column), _kind(column.type)) for name, column in names)
-    log = ArrowLog(path, "arrow", channels, batches=batches)
-    log.columns = dict(zip((channel.name for channel in log.channels), schema.names, strict=True))
+    cells = [(column, place) for column in schema for place in _places(column, batches)]
+    names = unique([column.name if place is None else f"{column.name}[{place}]" for column, place in cells])
+    channels = tuple(
+        Channel(name, _unit(column), _kind(column.type if place is None else column.type.value_type))
+        for name, (column, place) in zip(names, cells, strict=True)
+    )
+    columns = dict(zip(names, ((column.name, place) for column, place in cells), strict=True))
+    log = ArrowLog(path, "arrow", channels, batches=batches, columns=columns)
     _describe_time(log)
+    if not log.time and all(column in schema.names and log.find(column).kind == "number" for column in EPISODES):
+        log.time = EPISODES[0]
+        timed = replace(log.find(log.time), unit="s", kind="time")
+        log.channels = tuple(timed if channel.name == timed.name else channel for channel in channels)
     return log
+
+
+def _places(column: pa.Field, batches: Batches) -> Sequence[int | None]:
+    """List the places in lists of one length, which become channels; None stands for a column without such lists."""
+    if not any(test(column.type) for test in LISTS) or _kind(column.type.value_type) != "number":
+        return [None]
+    if pa.types.is_fixed_size_list(column.type):
+        size = column.type.list_size
+    else:
+        lists = (pc.drop_null(batch.column(0)) for batch in batches([column.name]))
+        size = next((len(some[0]) for some in lists if len(some)), 0)
+    return range(size) if 0 < size <= MAX_COLUMNS else [None]
 
 
 def _file(path: Path) -> tuple[pa.Schema, Batches]:
     with open_file(path) as file:
         head = file.read(4)
     if head == b"PAR1":
-        table = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # else a whole row group is held
+        table = parquet.ParquetFile(path, **PARQUET)
         return table.schema_arrow, lambda names: table.iter_batches(BATCH_ROWS, columns=list(names), use_threads=False)
     if head == b"FEA1":
         rows = feather.read_table(path, use_threads=False)
@@ -91,17 +120,59 @@ class ArrowLog(Log):
     """An opened table.  Time stamps become seconds from the whole second in which the log started."""
 
     batches: Batches = field(default=lambda names: iter(()))
-    columns: dict[str, str] = field(default_factory=dict)  # by channel
+    columns: dict[str, tuple[str, int | None]] = field(default_factory=dict)  # by channel; with the place in lists
     origin: int = 0  # [s] since 1970; the zero of time stamps
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
         self._restart(names, kinds=("number", "time"))
-        for batch in self.batches([self.columns[name] for name in names]):
-            columns = {name: batch.column(self.columns[name]) for name in names}
-            block = {name: _numbers(column, self.origin) for name, column in columns.items()}
+        episodes = _Episodes() if self.time == EPISODES[0] and self.time in names else None
+        needed = {self.columns[name][0] for name in (*names, *(EPISODES if episodes else ()))}
+        sizes = Counter(column for column, place in self.columns.values() if place is not None)
+        for batch in self.batches(sorted(needed)):
+            arrays = {column: batch.column(column) for column in needed}
+            values = {column: self._values(column, array, sizes[column]) for column, array in arrays.items()}
+            if episodes:
+                values[EPISODES[0]] = episodes.placed(*(values[column] for column in EPISODES))
+            cells = {name: self.columns[name] for name in names}
+            block = {
+                n: values[c] if p is None else np.ascontiguousarray(values[c][:, p]) for n, (c, p) in cells.items()
+            }
             if batch.num_rows:
-                yield self.count_nans(block, {name: column.null_count for name, column in columns.items()})
+                yield self.count_nans(block, {name: arrays[column].null_count for name, (column, _) in cells.items()})
+
+    def _values(self, column: str, array: pa.Array, size: int) -> Array:
+        """Convert a column to numbers (N,), or its lists of one length to numbers (N, size)."""
+        if not size:
+            return _numbers(array, self.origin)
+        lengths = pc.list_value_length(array).fill_null(size)
+        if len(array) and pc.min_max(lengths).as_py() != {"min": size, "max": size}:
+            raise BadLog(f"{self.path}: the lists of {column!r} have different lengths; save a column for each place")
+        present = _numbers(array.flatten(), self.origin).reshape(-1, size)
+        if not array.null_count:
+            return present
+        values = np.full((len(array), size), np.nan)
+        values[~absent(pa.chunked_array([array]))] = present
+        return values
+
+
+@dataclass
+class _Episodes:
+    """Episodes of a LeRobot data set, whose times begin anew: each is placed `EPISODE_GAP` after the one before."""
+
+    shift: float = 0.0  # [s] added to the times of the episode
+    last: float = -np.inf  # [s] the last time on the axis
+    number: float = np.nan
+
+    def placed(self, t: Array, numbers: Array) -> Array:
+        """Shift the next times (N,) [s] of the episodes with these numbers (N,)."""
+        parts = []
+        for part in np.split(np.column_stack([t, numbers]), 1 + np.flatnonzero(np.diff(numbers))):
+            if len(part) and part[0, 1] != self.number and part[0, 0] + self.shift <= self.last:
+                self.shift = self.last + EPISODE_GAP - part[0, 0]
+            parts.append(part[:, 0] + self.shift)
+            self.last, self.number = (parts[-1][-1], part[-1, 1]) if len(part) else (self.last, self.number)
+        return np.concatenate(parts)
 
 
 def _numbers(column: pa.Array, origin: int) -> Array:
@@ -120,7 +191,7 @@ def _describe_time(log: ArrowLog) -> None:
     log.time = next((channel.name for channel in log.channels if channel.kind == "time"), "")
     if not log.time:
         return
-    for batch in log.batches([log.columns[log.time]]):
+    for batch in log.batches([log.columns[log.time][0]]):
         stamps = pc.drop_null(batch.column(0))
         if len(stamps):
             log.origin = stamps[0].cast(pa.int64()).as_py() // PER_SECOND[stamps.type.unit]

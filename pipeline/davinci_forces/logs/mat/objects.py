@@ -135,6 +135,7 @@ class Objects:
 
     @cached_property
     def header(self) -> bytes:
+        """The header of the file, with the byte order."""
         with open_file(self.path) as file:
             return file.read(HEADER)
 
