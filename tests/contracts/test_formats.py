@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
 from davinci_forces.logs import FORMATS, open_log
 from davinci_forces.logs.log import Options
 from tests.logs import bag_writer
-from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73
+from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73, npy, npz, xlsx
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.reading import read
@@ -41,6 +41,7 @@ class Written:
     whole_only: bool = False  # the recorder writes it at once, so that one that was cut may be refused
     units: dict[str, str] = field(default_factory=lambda: UNITS)
     resolution: float = 0.0  # [s] of its times
+    precision: float = 0.0  # relative, of its numbers
     options: Options = Options()  # noqa: RUF009 - frozen; what a study has to say of it
 
 
@@ -137,6 +138,33 @@ def feather() -> Written:
     )
 
 
+def numpy_arrays() -> Written:
+    return _npz(packed=False)
+
+
+def numpy_packed() -> Written:
+    return _npz(packed=True)
+
+
+def _npz(packed: bool) -> Written:
+    content = npz({"t": TIMES, **COLUMNS}, packed)
+    return Written(content, "log.npz", {n: n for n in COLUMNS}, "t", whole_only=True, units=UNITLESS)
+
+
+def numpy_records() -> Written:
+    records = np.rec.fromarrays([TIMES, *COLUMNS.values()], names=["t", *COLUMNS])
+    names = {name: f"log/{name}" for name in COLUMNS}
+    return Written(npy(records), "log.npy", names, "log/t", whole_only=True, units=UNITLESS)
+
+
+def workbook() -> Written:
+    """Workbooks keep 16 digits."""
+    rows = np.column_stack([TIMES, *COLUMNS.values()]).tolist()
+    content = xlsx([["t", *COLUMNS], ["s", *UNITS.values()], *rows])
+    names = {name: name for name in COLUMNS}
+    return Written(content, "log.xlsx", names, "t", whole_only=True, resolution=1e-15, precision=1e-15)
+
+
 def binary() -> Written:
     """As LabVIEW writes: big-endian, row after row."""
     content = np.column_stack([TIMES, *COLUMNS.values()]).astype(">f8").tobytes()
@@ -148,7 +176,8 @@ def binary() -> Written:
 WRITERS = {
     "tdms": (tdms_with_a_step, tdms_in_segments), "lvm": (lvm_with_times, lvm_with_a_step), "tdm": (),  # never read
     "ros": (bag_of_ros_1, bag_of_ros_2, bag_of_mcap), "mat": (mat, mat_73), "hdf5": (hdf5_in_groups,),
-    "arrow": (parquet, feather), "binary": (binary,), "text": (text,),
+    "arrow": (parquet, feather), "npz": (numpy_arrays, numpy_packed, numpy_records), "xlsx": (workbook,),
+    "binary": (binary,), "text": (text,),
 }  # fmt: skip
 EXAMPLES = {write.__name__: (name, write()) for name, writers in WRITERS.items() for write in writers}
 EXAMPLE = pytest.mark.parametrize(("name", "written"), EXAMPLES.values(), ids=EXAMPLES)
@@ -168,7 +197,7 @@ def test_what_was_written_is_read_bit_for_bit(name: str, written: Written):
         channel = log.find(written.names[column])
         assert channel.unit == written.units[column]
         assert channel.kind == "number"
-        assert_array_equal(samples[channel.name], x)
+        assert_allclose(samples[channel.name], x, rtol=written.precision, atol=0)
         assert (log.nulls[channel.name], log.nans[channel.name]) == (0, 0)
 
 
@@ -192,7 +221,7 @@ def test_some_channels_in_another_order_are_the_same_and_so_is_a_second_pass(nam
         blocks = list(log.blocks(names))
         assert [set(block) for block in blocks] == [set(names)] * len(blocks)
         for channel, x in zip(names, reversed(COLUMNS.values()), strict=False):
-            assert_array_equal(np.concatenate([block[channel] for block in blocks]), x)
+            assert_allclose(np.concatenate([block[channel] for block in blocks]), x, rtol=written.precision, atol=0)
 
 
 @EXAMPLE
@@ -229,7 +258,7 @@ def test_inspect_shows_what_is_in_it(name: str, written: Written, tmp_path):
         name_of = {c["name"]: c["name"] for c in shown["channels"]} | {
             c.get("alias", c["name"]): c["name"] for c in shown["channels"]
         }
-        assert shown["head"][name_of[written.names[column]]] == x[:3].tolist()
+        assert_allclose(shown["head"][name_of[written.names[column]]], x[:3], rtol=written.precision, atol=0)
 
 
 @EXAMPLE

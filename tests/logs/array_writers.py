@@ -1,11 +1,12 @@
-"""Arrays as files of MATLAB, HDF5, Parquet and Feather."""
+"""Arrays as files of MATLAB, HDF5, Parquet, Feather, NumPy and Excel."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import h5py
 import numpy as np
+import openpyxl
 import pyarrow as pa
 from pyarrow import feather, parquet
 from scipy.io import savemat
@@ -66,4 +67,29 @@ def arrow(kind: str, columns: Mapping[str, Any], units: Mapping[str, str] = {}) 
     file = BytesIO()
     write = parquet.write_table if kind == "parquet" else feather.write_feather
     write(table, file)
+    return file.getvalue()
+
+
+def npz(arrays: Mapping[str, Any], packed: bool = False) -> bytes:
+    file = BytesIO()
+    (np.savez_compressed if packed else np.savez)(file, **arrays)
+    return file.getvalue()
+
+
+def npy(array: Any) -> bytes:
+    file = BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def xlsx(rows: Iterable[Sequence[Any]], **others: Iterable[Sequence[Any]]) -> bytes:
+    """A workbook of a sheet `log`, and others by name."""
+    book = openpyxl.Workbook()
+    for number, (title, cells) in enumerate({"log": rows, **others}.items()):
+        sheet = book.create_sheet(title, number)
+        for row in cells:
+            sheet.append(row)
+    del book["Sheet"]
+    file = BytesIO()
+    book.save(file)
     return file.getvalue()

@@ -10,7 +10,7 @@ from davinci_forces.logs.log import Channel, Log, Options
 from davinci_forces.maths.units import unit_in
 
 # Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
-FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "binary", "text")
+FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "npz", "xlsx", "binary", "text")
 BAG = ("metadata.yaml", "*.db3", "*.mcap")  # files in a folder that is a log: a ROS 2 bag
 
 

@@ -1,0 +1,127 @@
+"""Read the arrays of a NumPy file piece by piece, without pickle."""
+
+import math
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
+from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
+from davinci_forces.logs.log import Log, Options
+from davinci_forces.maths.arrays import Array
+
+MAX_MEMBERS = 1000
+PIECE = 1 << 20  # [bytes] that are skipped at once
+
+
+def open_in_child(path: Path, options: Options) -> Log:
+    """Open the file.
+
+    Raises
+    ------
+    BadLog
+        If it holds no array of samples, or more than `MAX_MEMBERS`.
+    """
+    log = ArrayLog(path, "npz", ())
+    with open_file(path) as file:
+        is_zip = file.read(2) == b"PK"
+    names = [""]
+    if is_zip:
+        with zipfile.ZipFile(path) as archive:
+            names = [info.filename for info in archive.infolist() if info.filename.endswith(".npy")]
+    if len(names) > MAX_MEMBERS:
+        raise BadLog(f"{path}: it holds {len(names)} arrays; a log has at most {MAX_MEMBERS}")
+    take_in(log, [array for name in names for array in _arrays(path, name, log)])
+    if not log.channels:
+        why = "; ".join(log.warnings) or ", ".join(log.facts) or "nothing"
+        raise BadLog(f"{path}: it holds no array of samples; it has {why}")
+    return log
+
+
+def _arrays(path: Path, member: str, log: Log) -> Iterator[NamedArray]:
+    """List an array, or the fields of an array of records; objects are Python's and are never loaded."""
+    name = member.removesuffix(".npy") or path.stem
+    with _opened(path, member) as file:
+        shape, by_column, dtype = _header(file)
+    if dtype.hasobject:
+        log.warnings.append(
+            f"{name} holds Python objects, which could run any code when they are loaded, and is left out; save its "
+            "numbers as arrays of their own: numpy.savez(file, t=..., q=...)"
+        )
+    elif dtype.names:
+        for part in dtype.names:
+            if not dtype[part].shape and not dtype[part].names:
+                yield NamedArray(f"{name}/{part}", Member(path, member, shape, dtype[part], by_column, part))
+    elif dtype.kind in "mM":
+        step, unit = dtype, np.datetime_data(dtype)[0]
+        log.warnings.append(f"{name} holds times of numpy ({step}, in {unit}), and is left out; save them in seconds")
+    else:
+        yield NamedArray(name, Member(path, member, shape, dtype, by_column))
+
+
+def _opened(path: Path, member: str) -> IO[bytes]:
+    if not member:
+        return open_file(path)
+    return zipfile.ZipFile(path).open(member)  # closing the member closes the file
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    version = npy.read_magic(file)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    return read(file)
+
+
+@dataclass
+class Member:
+    """An array of a file, of which the samples are read in order; `of_record` is a field of its records."""
+
+    path: Path
+    name: str
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    by_column: bool  # stored column after column
+    of_record: str = ""
+    pieces: list[Any] = field(default_factory=list)  # the opened file, and its next sample
+
+    def __getitem__(self, part: tuple[Any, ...]) -> Array:
+        """Read a part of it; samples before those read last are read again, and columns as a whole."""
+        rows_first = bool(part) and isinstance(part[0], slice) and part[0].stop is not None
+        if self.by_column or not rows_first:
+            if not self.pieces:
+                self.pieces.append(self._whole())
+            return np.asarray(self.pieces[0][part])
+        first, last, _ = part[0].indices(self.shape[0])
+        if not self.pieces or self.pieces[1] > first:
+            self.pieces[:] = [_opened(self.path, self.name), 0, None]
+            self.pieces[2] = _header(self.pieces[0])[2]
+        file, at, stored = self.pieces
+        width = math.prod(self.shape[1:]) * stored.itemsize
+        _skip(file, (first - at) * width)
+        values = np.frombuffer(_exactly(file, (last - first) * width), stored).reshape(last - first, *self.shape[1:])
+        self.pieces[1] = last
+        return np.asarray((values[self.of_record] if self.of_record else values)[(slice(None), *part[1:])])
+
+    def _whole(self) -> Any:
+        with _opened(self.path, self.name) as file:
+            shape, by_column, dtype = _header(file)
+            content = _exactly(file, math.prod(shape) * dtype.itemsize)
+        values = np.frombuffer(content, dtype).reshape(shape, order="F" if by_column else "C")
+        return values[self.of_record] if self.of_record else values
+
+
+def _skip(file: IO[bytes], count: int) -> None:
+    while count > 0:
+        count -= len(_exactly(file, min(count, PIECE)))
+
+
+def _exactly(file: IO[bytes], count: int) -> bytes:
+    content = file.read(count)
+    if len(content) < count:
+        raise ValueError(f"an array ends after {len(content)} of {count} bytes")
+    return content

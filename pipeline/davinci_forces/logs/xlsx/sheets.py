@@ -1,0 +1,146 @@
+"""Read the sheets of a workbook row by row, with openpyxl."""
+
+import zipfile
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from openpyxl import load_workbook
+
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.arrays import MAX_COLUMNS
+from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_in
+
+BLOCK_ROWS_SHEET = 1 << 12
+MAX_HEAD = 50  # rows above the first row of numbers
+MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
+EPOCH = datetime(1970, 1, 1)
+
+Row = tuple[Any, ...]
+
+
+def open_in_child(path: Path, options: Options) -> Log:
+    """Open the workbook; the sheet with the most rows is the log.
+
+    Raises
+    ------
+    BadLog
+        If no sheet holds columns of numbers, or its names are missing.
+    """
+    with zipfile.ZipFile(path) as archive:
+        size = sum(info.file_size for info in archive.infolist())
+    if size > MAX_UNPACKED:
+        raise BadLog(f"{path}: unpacked it has {size >> 20} MB, more than {MAX_UNPACKED >> 20}; export it as CSV")
+    with closing(load_workbook(path, read_only=True, data_only=True)) as book:
+        sheets = {sheet.title: sheet for sheet in book.worksheets}
+        heads = {title: _head(sheet.iter_rows(values_only=True, max_row=MAX_HEAD)) for title, sheet in sheets.items()}
+        tables = {title: head for title, head in heads.items() if head}
+        if not tables:
+            raise BadLog(f"{path}: none of its sheets ({', '.join(sheets)}) has columns of numbers below their names")
+        title = max(tables, key=lambda title: sheets[title].max_row or 0)
+    names, units, skipped, first = tables[title]
+    log = SheetLog(path, "xlsx", (), sheet=title, skipped=skipped)
+    kinds = ["time" if isinstance(v, datetime) else "number" if _is_number(v) else "text" for v in first]
+    called = unique(names)
+    log.channels = tuple(
+        Channel(name, unit or ("s" if kind == "time" else unit_in(name)), kind)
+        for name, unit, kind in zip(called, units, kinds, strict=True)
+    )
+    log.facts["sheet"] = title
+    if more := [other for other in tables if other != title]:
+        log.warnings.append(f"the sheets {', '.join(more)} are left out: the longest, {title!r}, is read")
+    stamp = next((value for value in first if isinstance(value, datetime)), None)
+    if stamp:
+        log.origin = stamp.replace(microsecond=0)
+        log.started, log.zone = log.origin.isoformat(), "local"
+        log.time = next(channel.name for channel in log.channels if channel.kind == "time")
+    return log
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | timedelta | time)
+
+
+def _head(rows: Iterator[Row]) -> tuple[list[str], list[str], int, Row] | None:
+    """Find the names of the columns, their units, the number of rows above the samples, and the first of these.
+
+    The names stand directly above the first row with a number, or above a row of units.
+    """
+    above: list[Row] = []
+    for number, row in enumerate(rows):
+        if not any(_is_number(value) or isinstance(value, date) for value in row):
+            above.append(row)
+            continue
+        texts = [[str(value or "").strip() for value in one] for one in above]
+        filled = [one for one in texts if sum(map(bool, one)) > 1] or [one for one in texts if any(one)]
+        if not filled or len(row) > MAX_COLUMNS:
+            return None
+        is_units = len(filled) > 1 and all(len(cell) <= 8 for cell in filled[-1]) and _widths(filled[-2], filled[-1])
+        names, units = (filled[-2], filled[-1]) if is_units else (filled[-1], [""] * len(row))
+        last = max(i for i, value in enumerate(row) if value is not None) + 1
+        width = max(last, *(i + 1 for i, name in enumerate(names) if name))
+        padded = [[*cells, *[""] * width][:width] for cells in (names, units)]
+        return padded[0], [unit.strip("[]()") for unit in padded[1]], number, (*row, *[None] * width)[:width]
+    return None
+
+
+def _widths(names: Sequence[str], units: Sequence[str]) -> bool:
+    """Whether a row of names has a name above each of the units."""
+    return all(name for name, unit in zip(names, units, strict=False) if unit)
+
+
+@dataclass
+class SheetLog(Log):
+    """A sheet of an opened workbook.  Dates become seconds from the whole second of the first."""
+
+    sheet: str = ""
+    skipped: int = 0  # rows above the samples
+    origin: datetime = EPOCH
+    width: int = field(default=0, init=False)
+
+    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples of these channels, as `Log.blocks` says."""
+        self._restart(names, kinds=("number", "time"))
+        place = {channel.name: i for i, channel in enumerate(self.channels)}
+        waiting: list[list[float]] = []
+        empty: list[list[bool]] = []
+        with closing(load_workbook(self.path, read_only=True, data_only=True)) as book:
+            for number, row in enumerate(book[self.sheet].iter_rows(values_only=True)):
+                if number < self.skipped or all(value is None for value in row):
+                    continue
+                cells = [row[place[name]] if place[name] < len(row) else None for name in names]
+                waiting.append([self._number(cell, number, name) for cell, name in zip(cells, names, strict=True)])
+                empty.append([cell is None or cell == "" for cell in cells])
+                if len(waiting) == BLOCK_ROWS_SHEET:
+                    yield self._block(names, waiting, empty)
+                    waiting, empty = [], []
+        if waiting:
+            yield self._block(names, waiting, empty)
+
+    def _block(self, names: Sequence[str], rows: list[list[float]], empty: list[list[bool]]) -> Block:
+        columns, missing = np.array(rows).T, np.array(empty).sum(axis=0)
+        block = {name: np.ascontiguousarray(column) for name, column in zip(names, columns, strict=True)}
+        return self.count_nans(block, dict(zip(names, missing.tolist(), strict=True)))
+
+    def _number(self, cell: Any, row: int, name: str) -> float:
+        """Convert a cell to a number, NaN where it is empty."""
+        if cell is None or cell == "":
+            return float("nan")
+        if isinstance(cell, datetime):
+            return (cell - self.origin).total_seconds()
+        if isinstance(cell, timedelta):
+            return cell.total_seconds()
+        if isinstance(cell, time):
+            return cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond / 1e6
+        try:
+            return float(cell)
+        except (TypeError, ValueError):
+            text = f"{cell}"[:40]
+            raise BadLog(
+                f"{self.path}: sheet {self.sheet!r}, row {row + 1}, column {name!r}: {text!r} is not a number; "
+                "correct the cell, or empty it"
+            ) from None
