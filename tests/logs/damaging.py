@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
@@ -64,6 +65,9 @@ def examples(all_texts: bool = False) -> Iterator[Example]:
         yield Example(f"mat_structs_{packed_too}", {"log.mat": array_writers.matlab(structs, packed_too)})
     objects = Path(__file__).with_name("objects.mat").read_bytes()
     yield Example("mat_objects", {"log.mat": objects})
+    lists = pa.FixedSizeListArray.from_arrays(pa.array(x.ravel()), 3)
+    episodes = {"timestamp": x[:, 0], "episode_index": np.arange(ROWS) // 50, "observation.state": lists}
+    yield Example("lerobot", {"log.parquet": array_writers.arrow("parquet", episodes)})
     yield Example("mat_73_structs", {"log.mat": array_writers.matlab_73(structs)})
     messages = [message for i, row in enumerate(x) for message in _messages(0.01 * i, row)]
     with tempfile.TemporaryDirectory() as home:

@@ -1,7 +1,10 @@
-"""MATLAB, HDF5, Parquet and Feather files: arrays by name, in structs, groups and columns."""
+"""Files of MATLAB, HDF5, Arrow, NumPy and Excel: arrays by name, in structs, groups and columns."""
 
 import sys
+import zipfile
+from datetime import datetime, timedelta
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -14,7 +17,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from davinci_forces.errors import BadLog
-from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73
+from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73, npy, npz, xlsx
 from tests.logs.reading import read
 
 ROWS = 30
@@ -321,6 +324,104 @@ def test_a_page_of_parquet_whose_checksum_is_wrong_is_refused():
     at = content.index(np.float64(T[7]).tobytes())
     with pytest.raises(BadLog, match=r"(?i)crc|checksum"):
         read(content[:at] + b"\1" + content[at + 1 :], "log.parquet")
+
+
+def test_objects_of_python_are_named_and_never_loaded(tmp_path):
+    class Touch:
+        def __reduce__(self):
+            return open, (str(tmp_path / "ran"), "w")
+
+    objects = np.array([Touch(), 1], dtype=object)
+    log, samples = read(npz({"t": T, "o": objects}), "log.npz")
+    assert names(log) == ["t"]
+    assert_array_equal(samples["t"], T)
+    assert "o holds Python objects" in log.warnings[0]
+    with pytest.raises(BadLog, match=r"holds Python objects.*numpy\.savez"):
+        read(npy(objects), "log.npy")
+    assert not (tmp_path / "ran").exists()
+
+
+def test_arrays_of_numpy_in_any_layout_are_the_same():
+    order = {"C": Q, "F": np.asfortranarray(Q), "big": Q.astype(">f4"), "across": Q.T, "nested": Q[:, None, :]}
+    for packed in (False, True):
+        log, samples = read(npz({**order, "gain": 2.5, "none": np.zeros((0, 3))}, packed), "log.npz")
+        for name in order:
+            assert_array_equal(np.column_stack([samples[f"{name}[{i}]"] for i in range(3)]), Q)
+        assert (log.facts["gain"], log.warnings) == ("2.5", [])
+
+
+def test_a_long_array_of_numpy_is_read_in_pieces_and_a_second_time():
+    x = np.arange(3e5).reshape(-1, 3)
+    log = opened(npz({"x": x}, packed=True), "log.npz")
+    for _ in range(2):
+        assert_array_equal(np.concatenate([block["x[1]"] for block in log.blocks(["x[1]"])]), x[:, 1])
+
+
+def test_an_array_that_claims_more_than_its_file_holds_is_refused():
+    content = npy(T).replace(b"(30,)", b"(99,)")
+    with pytest.raises(BadLog, match="ends after 240 of 792 bytes"):
+        read(content, "log.npy")
+
+
+def test_a_workbook_has_names_units_and_dates():
+    start = datetime(2024, 5, 1, 12, 0, 0, 250_000)
+    rows = [[start + timedelta(milliseconds=10 * i), 0.5 * i, None if i == 3 else i, "ok"] for i in range(ROWS)]
+    for head in ([["t", "q [rad]", "i", "note"]], [["t", "q", "i", "note"], ["", "rad", "A", ""]]):
+        log, samples = read(xlsx([["A title"], [], *head, *rows], more=[["x", "y"], [1, 2]]), "log.xlsx")
+        assert (log.time, log.started, log.zone) == ("t", "2024-05-01T12:00:00", "local")
+        np.testing.assert_allclose(samples["t"], 0.25 + T, rtol=0, atol=1e-6)
+        assert (log.find(log.channels[1].name).unit, log.find("note").kind) == ("rad", "text")
+        assert (log.nulls["i"], np.flatnonzero(np.isnan(samples["i"])).tolist()) == (1, [3])
+        assert log.warnings == ["the sheets more are left out: the longest, 'log', is read"]
+
+
+def test_a_workbook_that_is_no_table_says_what_is_wrong():
+    with pytest.raises(BadLog, match=r"none of its sheets \(log\) has columns of numbers below their names"):
+        read(xlsx([[0.1 * i, i] for i in range(5)]), "log.xlsx")
+    with pytest.raises(BadLog, match=r"sheet 'log', row 9, column 'q': 'oops' is not a number"):
+        read(xlsx([["t", "q"], *[[0.1 * i, "oops" if i == 7 else i] for i in range(20)]]), "log.xlsx")
+
+
+def test_without_openpyxl_the_message_says_how_to_install_it(monkeypatch):
+    content = xlsx([["t", "q"], [0.0, 1.0], [0.1, 2.0]])
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(BadLog, match=r"pip install davinci-forces\[xlsx\]"):
+        read(content, "log.xlsx")
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("bomb", ["entities", "array", pytest.param("blanks", marks=pytest.mark.slow)])
+def test_bombs_of_zip_and_xml_end_with_a_message_or_the_samples(bomb):
+    table = xlsx([["t", "q"], *[[0.1 * i, i] for i in range(20)]])
+    if bomb == "array":
+        content, name = (
+            zipped({"q.npy": npy(T).replace(b"(30,), }         ", b"(10000000000,), }") + bytes(64 << 20)}),
+            "log.npz",
+        )
+    else:
+        more = entities if bomb == "entities" else lambda sheet: sheet + b" " * (1100 << 20)
+        name = "log.xlsx"
+        with zipfile.ZipFile(BytesIO(table)) as parts:
+            members = {part: parts.read(part) for part in parts.namelist()}
+        sheet = "xl/worksheets/sheet1.xml"
+        content = zipped(members | {sheet: more(members[sheet])})
+    with pytest.raises(BadLog):
+        read(content, name)
+
+
+def entities(sheet: bytes) -> bytes:
+    """Each entity is ten of the one before: a billion letters in all."""
+    lines = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in pairwise("abcdefghij"))
+    head = f'<!DOCTYPE worksheet [<!ENTITY a "aaaaaaaaaa">{lines}]>'.encode()
+    return head + sheet.replace(b"<v>1</v>", b"<v>&j;</v>", 1)
+
+
+def zipped(members) -> bytes:
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as parts:
+        for name, content in members.items():
+            parts.writestr(name, content)
+    return file.getvalue()
 
 
 def opened(content: bytes, name: str):

@@ -59,9 +59,8 @@ def _arrays(path: Path, member: str, log: Log) -> Iterator[NamedArray]:
             if not dtype[part].shape and not dtype[part].names:
                 yield NamedArray(f"{name}/{part}", Member(path, member, shape, dtype[part], by_column, part))
     elif dtype.kind in "mM":
-        step, unit = dtype, np.datetime_data(dtype)[0]
-        log.warnings.append(f"{name} holds times of numpy ({step}, in {unit}), and is left out; save them in seconds")
-    else:
+        log.warnings.append(f"{name} holds times of type {dtype}, and is left out; save them as seconds")
+    elif math.prod(shape):
         yield NamedArray(name, Member(path, member, shape, dtype, by_column))
 
 
