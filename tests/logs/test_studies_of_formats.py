@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from typer.testing import CliRunner
 
@@ -11,8 +12,9 @@ from davinci_forces.cli import app
 from davinci_forces.errors import BadStudy
 from davinci_forces.study import reading
 from tests import arm
-from tests.logs.array_writers import hdf5
+from tests.logs.array_writers import arrow, hdf5, npz, xlsx
 from tests.logs.bag_writer import joint_state, write
+from tests.test_new import effort, motion
 
 SIGNAL = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
 COLUMNS = {"time": SIGNAL.t, "hand_roll.q": SIGNAL.q, "hand_roll.dq": SIGNAL.dq, "hand_roll.tau": SIGNAL.tau}
@@ -165,3 +167,51 @@ def test_processes_that_read_by_children_of_their_own_make_the_same(tmp_path):
         made.append({file.relative_to(home): file.read_bytes() for file in home.rglob("*.parquet")})
     assert len(made[0]) > 2
     assert made[0] == made[1]
+
+
+def lists(x) -> pa.Array:
+    return pa.FixedSizeListArray.from_arrays(pa.array(x.ravel()), x.shape[1])
+
+
+def as_npz(t, q, dq, tau) -> bytes:
+    return npz({"t": t, "q": q, "dq": dq, "tau": tau})
+
+
+def as_xlsx(t, q, dq, tau) -> bytes:
+    names = ["t [s]", *(f"{symbol}{k}" for symbol in ("q", "dq", "tau") for k in (1, 2))]
+    return xlsx([names, *np.column_stack([t, q, dq, tau]).tolist()])
+
+
+def as_parquet(t, q, dq, tau) -> bytes:
+    """As LeRobot: two episodes, each with times of its own."""
+    first = len(t) // 3
+    times = np.concatenate([t[:first], t[first:] - t[first]])
+    columns = {"position": lists(q), "velocity": lists(dq), "effort": lists(tau)}
+    episodes = {"timestamp": times, "episode_index": (np.arange(len(t)) >= first).astype(int)}
+    return arrow("parquet", episodes | {f"observation.{name}": values for name, values in columns.items()})
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(("ending", "content"), [("npz", as_npz), ("xlsx", as_xlsx), ("parquet", as_parquet)])
+@pytest.mark.parametrize("command", ["ingest", pytest.param("all", marks=pytest.mark.slow)])
+def test_logs_of_arrays_go_through_new_without_an_edit(tmp_path, ending, content, command):
+    folder = tmp_path / "raw" / "arm"
+    folder.mkdir(parents=True)
+    logs = {}
+    for name, seed, repeats in (("excitation", 0, True), ("validation", 5, False)):
+        t, q, dq = motion(2, seed, repeats)
+        # Two episodes are not one motion: a gap within one motion is taken for a fault of the clock, and mended.
+        first = len(t) // 3 if ending == "parquet" else 0
+        q, dq = (np.concatenate([x[100 : 100 + first], x[: len(t) - first]]) for x in (q, dq))
+        logs[name] = (t, q, dq, effort(q, dq))
+        (folder / f"{name}.{ending}").write_bytes(content(*logs[name]))
+    call("new", *sorted(folder.iterdir()))
+    assert "error" not in call(command, folder)
+    for name, (t, q, dq, tau) in logs.items():
+        for k in range(2):
+            recorded = davinci_forces.read(folder, "Recording", log=name, joint=f"joint_{k + 1}")
+            gap = 1.0 - (t[1] - t[0]) if ending == "parquet" else 0.0  # between its episodes
+            expected = t + gap * (np.arange(len(t)) >= len(t) // 3)
+            np.testing.assert_allclose(recorded["t"], expected, rtol=0, atol=1e-9)
+            for symbol, column in (("q", q), ("dq", dq), ("tau", tau)):
+                np.testing.assert_allclose(recorded[symbol], column[:, k], rtol=1e-15, atol=0)

@@ -133,7 +133,7 @@ class ArrowLog(Log):
             arrays = {column: batch.column(column) for column in needed}
             values = {column: self._values(column, array, sizes[column]) for column, array in arrays.items()}
             if episodes:
-                values[EPISODES[0]] = episodes.placed(*(values[column] for column in EPISODES))
+                values[EPISODES[0]] = episodes.times(*(values[column] for column in EPISODES))
             cells = {name: self.columns[name] for name in names}
             block = {
                 n: values[c] if p is None else np.ascontiguousarray(values[c][:, p]) for n, (c, p) in cells.items()
@@ -164,7 +164,7 @@ class _Episodes:
     last: float = -np.inf  # [s] the last time on the axis
     number: float = np.nan
 
-    def placed(self, t: Array, numbers: Array) -> Array:
+    def times(self, t: Array, numbers: Array) -> Array:
         """Shift the next times (N,) [s] of the episodes with these numbers (N,)."""
         parts = []
         for part in np.split(np.column_stack([t, numbers]), 1 + np.flatnonzero(np.diff(numbers))):

@@ -6,12 +6,11 @@ from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
 NPY = b"\x93NUMPY"
-ZIP = b"PK\x03\x04"
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether it begins as an array, or is a zip file whose first member is one."""
-    return head.startswith(NPY) or (head.startswith(ZIP) and b".npy" in head[30:542])
+    return head.startswith(NPY) or (head.startswith(b"PK") and b".npy" in head[30:542])
 
 
 def read(path: Path, options: Options) -> Log:

@@ -5,14 +5,13 @@ from pathlib import Path
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
-ZIP = b"PK\x03\x04"
-SUFFIXES = (".xlsx", ".xlsm")
-MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")  # one of them comes first
+FIRST_MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether it is a zip file of a workbook."""
-    return head.startswith(ZIP) and (path.suffix.lower() in SUFFIXES or head[30:].startswith(MEMBERS))
+    is_named = path.suffix.lower() in (".xlsx", ".xlsm")
+    return head.startswith(b"PK") and (is_named or head[30:].startswith(FIRST_MEMBERS))
 
 
 def read(path: Path, options: Options) -> Log:

@@ -3,7 +3,7 @@
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_i
 BLOCK_ROWS_SHEET = 1 << 12
 MAX_HEAD = 50  # rows above the first row of numbers
 MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
-EPOCH = datetime(1970, 1, 1)
 
 Row = tuple[Any, ...]
 
@@ -99,8 +98,7 @@ class SheetLog(Log):
 
     sheet: str = ""
     skipped: int = 0  # rows above the samples
-    origin: datetime = EPOCH
-    width: int = field(default=0, init=False)
+    origin: datetime = datetime.min
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
