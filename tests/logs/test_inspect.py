@@ -136,3 +136,12 @@ def test_a_log_of_words_alone_is_shown(tmp_path: Path) -> None:
     with TdmsWriter(str(path)) as writer:
         writer.write_segment([ChannelObject("a", "words", ["grasp", "let go"])])
     assert "0  a/words  -  text" in shown(path)
+
+
+@pytest.mark.parametrize("cell", ["", "nan"])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_column_without_any_number_is_shown(tmp_path, cell, place):
+    rows = [["3" if row % 2 else "1", "5", f"{row % 3}"] for row in range(9)]
+    lines = (";".join([*row[:place], cell, *row[place + 1 :]]) for row in rows)
+    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]))
+    assert f"column_{place}" in shown(tmp_path / "log.csv")

@@ -301,3 +301,24 @@ def test_values_of_daq_cards_are_read_as_npTDMS_reads_them_however_long_their_ch
     for name, values in raw.items():
         assert_array_equal(samples[name], np.tile(0.5 * values + 1, 3))
         assert_array_equal(samples[name], TdmsFile.read(io.BytesIO(content))["a"][name[2:]][:])
+
+
+def in_segments(*units: str) -> bytes:
+    """A channel whose segments state these units; written by npTDMS."""
+    file = io.BytesIO()
+    for unit in units:
+        with TdmsWriter(file) as writer:
+            writer.write_segment([ChannelObject("G", "x", np.arange(5.0), {"unit_string": unit})])
+    return file.getvalue()
+
+
+def test_a_unit_that_is_stated_late_is_the_unit_of_the_channel():
+    log, samples = read(in_segments("", "g"), "log.tdms")
+    assert log.find("G/x").unit == "g"
+    assert_array_equal(samples["G/x"], [*range(5), *range(5)])
+
+
+def test_a_unit_that_changes_is_refused():
+    for units in (("g", "V"), ("", "g", "V")):
+        with pytest.raises(BadLog, match="mean two things"):
+            read(in_segments(*units), "log.tdms")
