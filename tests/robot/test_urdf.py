@@ -287,6 +287,16 @@ def test_what_is_wrong_with_a_file_is_said_with_its_element_its_line_and_a_remed
     assert says in "\n".join(problems)
 
 
+@pytest.mark.parametrize("axis", ["0 0 0", "0 0", "nan 0 0", "1e400 0 0"])
+def test_the_axis_of_a_fixed_joint_is_ignored_whatever_it_says(axis):
+    start = GRIPPER.index('<joint name="a"')
+    text = GRIPPER[:start] + GRIPPER[start:].replace('xyz="1 0 0"', f'xyz="{axis}"', 1)
+    assert text != GRIPPER
+    arm, plain = robot(text), robot(GRIPPER)
+    assert np.array_equal(arm.chain.placement, plain.chain.placement)
+    assert np.array_equal(arm.bodies.masses, plain.bodies.masses)
+
+
 def test_every_problem_of_a_file_is_in_one_message(tmp_path):
     broken = GRIPPER.replace('value="0.3"', 'value="x"').replace('joint="c"', 'joint="z"').replace("1 2 -0.5", "0 0 0")
     (tmp_path / "arm.urdf").write_text(broken)

@@ -212,7 +212,10 @@ def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
 
 
 def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
-    """Read a joint; a joint of unknown type becomes a fixed joint, so that the links after it stay connected."""
+    """Read a joint; a joint of unknown type becomes a fixed joint, so that the links after it stay connected.
+
+    The axis of a fixed joint is ignored: exporters of CAD programs write 0 0 0.
+    """
     notes, kind = Notes(file, element), element.attributes.get("type", "")
     name = notes.name(element, "name", "its name")
     parent_link = notes.name(element.child("parent"), "link", 'its <parent link="..."/>')
@@ -221,10 +224,11 @@ def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
         remedy = "replace it by several of these" if kind in ("floating", "planar") else "correct it"
         notes.problem(f"type is {excerpt(kind)}, but must be {', '.join(MOVING)} or fixed; {remedy}")
         kind = "fixed"
-    axis = np.array(notes.numbers(element.child("axis"), "xyz", [1.0, 0.0, 0.0]))
+    stated_axis = None if element.attributes.get("type") == "fixed" else element.child("axis")
+    axis = np.array(notes.numbers(stated_axis, "xyz", [1.0, 0.0, 0.0]))
     length = float(np.linalg.norm(axis))
     if not length:
-        notes.problem("xyz is 0 0 0, but an axis needs a direction", element.child("axis"))
+        notes.problem("xyz is 0 0 0, but an axis needs a direction", stated_axis)
     mimic = element.child("mimic")
     bounds = _bounds(notes, element.child("limit"), kind)
     return UrdfJoint(
