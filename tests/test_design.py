@@ -143,3 +143,15 @@ def test_a_chain_that_no_table_describes_has_links_without_parameters():
     assert np.isnan(links.alpha).all()
     assert links.mass[0] == 0.0
     assert links.mass[1] == 0.5
+
+
+# What public recordings of such arms reach: rad, rad, m.
+@pytest.mark.parametrize(("joint", "low", "high"), [(0, -0.80, 0.80), (1, -0.80, 0.80), (2, 0.092, 0.235)])
+def test_the_research_kit_has_the_limits_of_its_own_arm_which_hold_its_recordings(joint, low, high):
+    least, most = dvrk_psm.ROBOT.joints[joint].limits.q
+    assert least < low < high < most
+    assert least != davinci.ROBOT.joints[joint].limits.q[0]
+
+
+def test_the_slide_of_the_research_kit_stays_off_its_stops():
+    assert dvrk_psm.ROBOT.joint("instrument_slide").limits.q == (0.0, 0.24)

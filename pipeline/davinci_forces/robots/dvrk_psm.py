@@ -43,6 +43,9 @@ PSM_CHAIN = modified_denavit_hartenberg(
 )
 
 
+# Ends of yaw, pitch and insertion [rad, m], as psm.urdf.xacro of WPI-AIM's dvrk_env states them.  Its rates are no
+# limits of the drives; those of Table 6.2 stay.
+POSITIONS = ((-1.605, 1.5994), (-0.93556, 0.94249), (0.0, 0.24))
 HARMONICS = 6  # in the excitation trajectories of the public identification data.  Wang et al. 2019
 
 ROBOT = Robot(
@@ -50,9 +53,16 @@ ROBOT = Robot(
     title="da Vinci Research Kit, patient-side manipulator",
     joints=tuple(
         replace(
-            joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS, published=(), physical=None, printed=None
+            joint,
+            limits=replace(joint.limits, q=q),
+            gear_ratio=1.0,
+            torque_constant=1.0,
+            harmonics=HARMONICS,
+            published=(),
+            physical=None,
+            printed=None,
         )
-        for joint in davinci.ROBOT.joints
+        for joint, q in zip(davinci.ROBOT.joints, POSITIONS, strict=True)
     ),
     chain=PSM_CHAIN,
     wrist=("instrument_roll", "instrument_pitch", "instrument_yaw"),
