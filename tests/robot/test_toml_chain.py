@@ -11,6 +11,7 @@ from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.robots.dvrk_psm import PSM_CHAIN
 
+SHIPPED = Path(__file__).parents[2] / "raw" / "ur10e"
 TWO = """
 name = "two"
 [[joint]]
@@ -114,3 +115,15 @@ def test_what_is_wrong_with_a_chain_is_said_with_its_line(tmp_path, old, new, sa
     with pytest.raises(BadRobot) as caught:
         load(tmp_path, TWO.replace(old, new, 1))
     assert says in str(caught.value)
+
+
+# The published lengths and those of its URDF differ by at most 1.5 mm in 0.6 m.
+def test_the_shipped_ur10e_moves_as_its_urdf_does(data):
+    files = (("ur10e.toml", SHIPPED), ("ur10e.urdf", data / "ur10e"))
+    arms = [robots.read_with_problems(*file)[0] for file in files]
+    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, 300, 6)) * np.array([3.0, 2.0, 5.0])[:, None, None]
+    ours, theirs = (rigid_body.regressor(arm.chain, q, dq, ddq).reshape(1800, -1) for arm in arms)
+    U, s, _ = np.linalg.svd(ours, full_matrices=False)
+    base = U[:, s > 1e-9 * s[0]]
+    assert base.shape[1] == 36  # base parameters of six revolute joints, the first of them vertical
+    assert np.linalg.norm(theirs - base @ (base.T @ theirs)) < 0.0015 / 0.6 * np.linalg.norm(theirs)
