@@ -3,9 +3,18 @@
     tau = Y(q, dq, ddq) pi + diag(ddq) J_m + diag(dq) v + diag(sign(dq)) c                            (6.3), (A.16)
 
 Dependent columns are omitted, so that the criterion refers to the base parameters of the arm.
+
+The search follows the gradient.  A criterion f(F) has a gradient df/dF, and each row of F depends on the motion at one
+instant only, so that few perturbed motions give the gradient by all coefficients:
+
+    df = sum_k  trace((df/dF_k)' dF_k),    F_k = F(q(t_k), dq(t_k), ddq(t_k))
+
+Limits c(x) <= 0 are penalised by the augmented Lagrangian f + mu/2 sum max(0, c + lambda / mu)^2, and lambda becomes
+mu max(0, c + lambda / mu).  Nocedal and Wright, Numerical Optimization, 2006, chapter 17.  The sign in the friction is
+tanh(dq / w) with a width w that decreases.  A last scaling keeps the limits at every instant.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,30 +22,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, basis, instants
-from davinci_forces.maths.excitation.joint import (
-    ExcitationProblem,
-    delay,
-    from_standstill,
-    impossible,
-    scale_to_limits,
-    shrink_into_limits,
-)
-from davinci_forces.maths.excitation.search import ReportStart, ignore_start, minimise
+from davinci_forces.maths.excitation.fourier import CRITERIA, GRADIENTS, Fourier, basis, instants
+from davinci_forces.maths.excitation.joint import ExcitationProblem, extremes, impossible, limit_share, shrink_into_limits
+from davinci_forces.maths.excitation.limits import ArmLimits, shrink_into_arm_limits
+from davinci_forces.maths.excitation.search import ReportStart, ignore_start
 from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, base_parameters
-from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-TRAJECTORIES_AT_ONCE = 8  # the regressors of this many trajectories fit into a processor's cache
+EXPLORED = 12  # random trajectories of a start, searched on few samples
+REFINED = 3  # the best of them, searched on all samples
+SAMPLES_EXPLORED = 16  # samples for each harmonic: eight in a period of the products of two harmonics
+LIMIT_INSTANTS = 40  # for each harmonic; a peak between two of them is higher by at most (pi / 40)^2 / 2
+# Penalties mu, with the share of the width of the friction's sign.  With the first, a limit is exceeded by a tenth.
+STAGES = ((30.0, 2.0), (120.0, 1.0), (480.0, 0.5), (2e3, 0.25), (8e3, 0.125), (3e4, 0.0625))
+EXPLORATION, SELECTION = 2, 3  # stages before the best trajectories are chosen
+ITERATIONS = 60  # of L-BFGS in each stage
+STEP = 1e-6  # of the differences, relative to 1 rad or m: their error is 1e-10
+HUGE = 1e10  # of a motion without full rank
 
 
 @dataclass(frozen=True)
 class ArmExcitationProblem:
     """The excitation of the first joints of an arm together; they share period, samples and criterion."""
 
-    chain: Chain
+    chain: Chain  # of the moving links
     joints: tuple[ExcitationProblem, ...]
     columns: NDArray[np.int64]  # indices of the base parameters' columns among all columns (p,)
+    limits: ArmLimits
 
 
 class ArmDesign(NamedTuple):
@@ -46,16 +59,56 @@ class ArmDesign(NamedTuple):
     optima: Array
 
 
-def arm_problem(chain: Chain, joints: Sequence[ExcitationProblem]) -> ArmExcitationProblem:
+class Stage(NamedTuple):
+    """A problem with its bases: what the search needs at each step."""
+
+    problem: ArmExcitationProblem
+    bases: list[tuple[Array, Array, Array]]  # at the samples of the criterion, for each joint
+    limit_bases: list[tuple[Array, Array, Array]]
+    scale: Array  # of the velocity of each joint (n,)
+
+    @classmethod
+    def of(cls, problem: ArmExcitationProblem, samples: int) -> "Stage":
+        """The stage whose criterion has this many samples."""
+        period, harmonics = problem.joints[0].period, [joint.harmonics for joint in problem.joints]
+        t, dense = instants(period, samples), instants(period, LIMIT_INSTANTS * max(harmonics))
+        half = np.ptp(np.array([joint.limits for joint in problem.joints]), axis=-1) / 2  # (n, 3)
+        top = 2 * np.pi / period * np.array(harmonics)
+        scale = np.min([half[:, 0] * 2 * np.pi / period, half[:, 1], half[:, 2] / top], axis=0)
+        return cls(problem, *([basis(period, N, times) for N in harmonics] for times in (t, dense)), scale)
+
+    def coefficients(self, z: Array) -> list[Array]:
+        """The coefficients of each joint: z in units of its scale, about the middle of its positions."""
+        parts = np.split(z, np.cumsum([1 + 2 * joint.harmonics for joint in self.problem.joints])[:-1])
+        return [joint.centre + s * part for joint, s, part in zip(self.problem.joints, self.scale, parts, strict=True)]
+
+    def motion(self, x: Sequence[Array]) -> list[Array]:
+        """Position, velocity and acceleration (K, n) at the samples of the criterion."""
+        return [np.stack([B[i] @ c for B, c in zip(self.bases, x, strict=True)], axis=-1) for i in range(3)]
+
+    def width(self, share: float) -> Array:
+        """The width (n,) of the friction's sign: a share of the change of velocity between two samples."""
+        N = max(joint.harmonics for joint in self.problem.joints)
+        return np.asarray(share * self.scale * 2 * np.pi * N / len(self.bases[0][0]))
+
+
+def arm_problem(
+    chain: Chain, joints: Sequence[ExcitationProblem], limits: ArmLimits | None = None
+) -> ArmExcitationProblem:
     """The excitation problem of these joints, with the base parameters of the arm."""
+    moving, _ = fold_fixed_links(chain.with_coordinates(len(joints)), np.zeros((len(chain.parent), 10)))
     q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RANDOM_SAMPLES, len(joints)))
-    all_columns = np.arange(10 * len(chain.parent) + 3 * len(joints))
-    return ArmExcitationProblem(chain, tuple(joints), base_parameters(_columns(chain, q, dq, ddq, all_columns)).columns)
+    F = _columns(moving, q, dq, ddq, np.arange(10 * len(moving.parent) + 3 * len(joints)))
+    columns = base_parameters(F.reshape(-1, F.shape[-1])).columns
+    return ArmExcitationProblem(moving, tuple(joints), columns, limits or ArmLimits(chain))
 
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    return np.asarray(_observations(problem, [joint_series.x[None] for joint_series in series])[0])
+    stage = Stage.of(problem, problem.joints[0].samples)
+    return _columns(problem.chain, *stage.motion([s.x for s in series]), problem.columns).reshape(
+        -1, len(problem.columns)
+    )
 
 
 def design_together(
@@ -70,42 +123,124 @@ def design_together(
     """
     if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
         raise ValueError(reason)
-    criterion = CRITERIA[problem.joints[0].criterion]
-
-    def objective(z: Array) -> Array:
-        chunks = (z[i : i + TRAJECTORIES_AT_ONCE] for i in range(0, len(z), TRAJECTORIES_AT_ONCE))
-        return np.concatenate([criterion(_observations(problem, _trajectories(problem, chunk))) for chunk in chunks])
-
-    best = minimise(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, report_start)
-    if not np.isfinite(best.values).any():
-        raise ValueError("no trajectory of these harmonics identifies all base parameters of the arm")
-    parts = zip(problem.joints, _trajectories(problem, best.z[None]), strict=True)
-    return ArmDesign(
-        [shrink_into_limits(joint, Fourier.from_coefficients(x[0], joint.period)) for joint, x in parts], best.values
-    )
+    designs = list[tuple[float, list[Fourier]]]()
+    for start in range(starts):
+        designs.append(_design(problem, np.random.default_rng([seed, start])))
+        report_start(start + 1, starts, designs[-1][0])
+    value, series = min(designs, key=lambda design: design[0])
+    if not np.isfinite(value):
+        raise ValueError(
+            "no trajectory of these harmonics within the limits identifies all base parameters of the arm"
+        )
+    return ArmDesign(series, np.array([value for value, _ in designs]))
 
 
-def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
-    """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first joint starts at rest, up to the delay."""
-    first = problem.joints[0]
-    ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
-    lead, *others = np.split(z, ends[:-1], axis=1)
-    lead, phase = from_standstill(lead, first.samples)
-    parts = zip(problem.joints, (lead, *others), strict=True)
-    return [scale_to_limits(delay(part, phase), joint.limits, first.period) for joint, part in parts]
+def _design(problem: ArmExcitationProblem, random: np.random.Generator) -> tuple[float, list[Fourier]]:
+    """The best trajectory of one start, and its criterion: explore many, refine a few, finish the best."""
+    K, N = problem.joints[0].samples, max(joint.harmonics for joint in problem.joints)
+    coarse, fine = Stage.of(problem, min(K, SAMPLES_EXPLORED * N)), Stage.of(problem, K)
+    explored = [_descend(coarse, _random(coarse, random), 0, EXPLORATION)[0] for _ in range(EXPLORED)]
+    explored.sort(key=lambda z: _result(fine, z)[0])
+    refined = [_descend(fine, z, 0, SELECTION) for z in explored[:REFINED]]
+    z, multipliers = min(refined, key=lambda pair: _result(fine, pair[0])[0])
+    return _result(fine, _descend(fine, z, SELECTION, len(STAGES), multipliers)[0])
 
 
-def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:
-    """F (S, K n, p) of many trajectories, from the coefficients (S, 1 + 2 N_f) of each joint."""
-    first = problem.joints[0]
-    t = instants(first.period, first.samples)
-    bases = [basis(first.period, joint.harmonics, t) for joint in problem.joints]
-    q, dq, ddq = (np.stack([part @ B[i].T for B, part in zip(bases, x, strict=True)], axis=-1) for i in range(3))
-    return _columns(problem.chain, q, dq, ddq, problem.columns)
+def _random(stage: Stage, random: np.random.Generator) -> Array:
+    """Random harmonics that touch a limit of each joint, about the middle of its positions."""
+    parts = []
+    for joint, scale in zip(stage.problem.joints, stage.scale, strict=True):
+        c = random.normal(size=(1, 2 * joint.harmonics))
+        parts += [np.zeros(1), c[0] / limit_share(*extremes(c, joint.period), joint.limits)[0] / scale]
+    return np.concatenate(parts)
 
 
-def _columns(chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64]) -> Array:
-    """The selected columns (..., K n, p) of F; q, dq and ddq are (..., K, n).
+def _result(stage: Stage, z: Array) -> tuple[float, list[Fourier]]:
+    """The criterion of a trajectory after it was shrunk into all limits, and that trajectory."""
+    joints = stage.problem.joints
+    series = [
+        shrink_into_limits(joint, Fourier.from_coefficients(x, joint.period))
+        for joint, x in zip(joints, stage.coefficients(z), strict=True)
+    ]
+    within = shrink_into_arm_limits(stage.problem.limits, series)
+    if within is None:
+        return np.inf, series
+    return float(CRITERIA[joints[0].criterion](arm_observation(stage.problem, within))), within
+
+
+def _descend(
+    stage: Stage, z: Array, first: int, last: int, multipliers: list[Array] | None = None
+) -> tuple[Array, list[Array] | None]:
+    """Descend from z through stages of the augmented Lagrangian; return the last z and its multipliers."""
+    from scipy.optimize import minimize  # here, so that not every command loads it
+
+    for penalty, share in STAGES[first:last]:
+
+        def lagrangian(z: Array) -> tuple[float, Array]:
+            return _lagrangian(stage, z, penalty, multipliers, stage.width(share))[:2]  # noqa: B023
+
+        z = minimize(lagrangian, z, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "maxcor": 30}).x
+        multipliers = _lagrangian(stage, z, penalty, multipliers, stage.width(share))[2]
+    return z, multipliers
+
+
+def _lagrangian(
+    stage: Stage, z: Array, mu: float, multipliers: list[Array] | None, width: Array
+) -> tuple[float, Array, list[Array]]:
+    """The augmented Lagrangian, its gradient by z, and the next multipliers."""
+    problem, x = stage.problem, stage.coefficients(z)
+    motion = stage.motion(x)
+    F = _columns(problem.chain, *motion, problem.columns, width)
+    value, dF = GRADIENTS[problem.joints[0].criterion](F.reshape(-1, F.shape[-1]))
+    if not np.isfinite(dF).all():
+        return HUGE, np.zeros_like(z), multipliers or []
+    dF, excess = dF.reshape(F.shape), problem.limits.excess(*motion)
+    before = multipliers or [np.zeros(1)] * (1 + len(x))
+    after = [mu * np.maximum(0.0, excess + before[0] / mu)]
+
+    def of_sample(q: Array, dq: Array, ddq: Array) -> Array:
+        total = np.einsum("...kjc,kjc->...k", _columns(problem.chain, q, dq, ddq, problem.columns, width), dF)
+        c = problem.limits.excess(q, dq, ddq)
+        return np.asarray(total + mu / 2 * (np.maximum(0.0, c + before[0] / mu) ** 2).sum(axis=-1))
+
+    slopes, gradient = _slopes(of_sample, motion), []
+    for i, (joint, B, Q) in enumerate(zip(problem.joints, stage.bases, stage.limit_bases, strict=True)):
+        c, dc = _joint_excess(joint, Q, x[i])
+        after.append(mu * np.maximum(0.0, c + before[1 + i] / mu))
+        gradient.append(sum(slopes[d][:, i] @ B[d] for d in range(3)) + dc(after[-1]))
+    value += sum(float((part**2).sum()) for part in after) / (2 * mu)
+    return value, np.concatenate([s * part for s, part in zip(stage.scale, gradient, strict=True)]), after
+
+
+def _slopes(function: Callable[[Array, Array, Array], Array], motion: Sequence[Array]) -> list[Array]:
+    """Derivatives (K, n) of a function (K,) of each sample of a motion by q, dq and ddq (K, n)."""
+    slopes = [np.empty_like(part) for part in motion]
+    for i, slope in enumerate(slopes):
+        for j in range(slope.shape[1]):
+            both = [np.stack([part, part]) for part in motion]
+            both[i][:, :, j] += np.array([[STEP], [-STEP]])
+            ahead, behind = function(both[0], both[1], both[2])
+            slope[:, j] = (ahead - behind) / (2 * STEP)
+    return slopes
+
+
+def _joint_excess(
+    joint: ExcitationProblem, bases: Sequence[Array], x: Array
+) -> tuple[Array, Callable[[Array], Array]]:
+    """The excess (6 G,) over a joint's limits, in shares of half their range, and its derivative by x, transposed."""
+    rows, bounds = [], []
+    for (low, high), B in zip(joint.limits, bases, strict=True):
+        half, middle = ((high - low) / 2, (high + low) / 2) if np.isfinite([low, high]).all() else (np.inf, 0.0)
+        rows += [B / half, -B / half]
+        bounds += [np.full(len(B), 1 + middle / half), np.full(len(B), 1 - middle / half)]
+    A = np.concatenate(rows)
+    return A @ x - np.concatenate(bounds), lambda weights: weights @ A
+
+
+def _columns(
+    chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None
+) -> Array:
+    """The selected columns (..., n, p) of F; q, dq and ddq are (..., n).  A width (n,) makes the friction smooth.
 
     The 10 L + 3 n columns are the inertial parameters of links, then rotors, viscous and Coulomb friction of joints.
     """
@@ -113,7 +248,8 @@ def _columns(chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.
     of_links = columns[columns < links]
     F = np.zeros((*q.shape, len(columns)))
     F[..., : len(of_links)] = compiled_regressor(chain, q, dq, ddq)[..., of_links]
+    sign = np.sign(dq) if width is None else np.tanh(dq / width)
     for i in range(len(of_links), len(columns)):
         kind, joint = divmod(columns[i] - links, q.shape[-1])
-        F[..., joint, i] = (ddq, dq, np.sign(dq))[kind][..., joint]
-    return F.reshape(*q.shape[:-2], -1, len(columns))
+        F[..., joint, i] = (ddq, dq, sign)[kind][..., joint]
+    return F

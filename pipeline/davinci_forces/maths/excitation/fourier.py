@@ -143,6 +143,26 @@ def _where_full_rank(F: Array, smallest: Array, largest: Array, value: Callable[
 CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condition}
 
 
+def determinant_gradient(F: Array) -> tuple[float, Array]:
+    """-ln det(F^T F) of F (K, p), and its gradient -2 F (F^T F)^-1 by the entries of F."""
+    R = triangle(F)
+    with np.errstate(divide="ignore"):
+        value = -2 * float(np.log(np.abs(np.diagonal(R))).sum())
+    inverse = np.linalg.inv(R) if np.isfinite(value) else np.full_like(R, np.inf)
+    return value, np.asarray(-2 * (F @ inverse) @ inverse.T)
+
+
+def condition_gradient(F: Array) -> tuple[float, Array]:
+    """The natural logarithm of the condition number of F (K, p), and its gradient by the entries of F."""
+    s, V = np.linalg.svd(triangle(F))[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = (np.outer(F @ v, v) / size**2 for v, size in ((V[0], s[0]), (V[-1], s[-1])))
+        return float(np.log(s[0] / s[-1])), np.asarray(np.subtract(*ends))
+
+
+GRADIENTS = {"determinant": determinant_gradient, "condition": condition_gradient}
+
+
 def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (K,) at t (K,) [s] of a run-in, from rest at -duration to full speed at 0."""
     u = 1 + t / duration

@@ -121,13 +121,18 @@ def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float)
     """
     low, high = limits[0]
     lowest, highest = extremes(z[:, 1:], period)
-    n = (highest[0] - lowest[0]) / (high - low)
-    for i in (1, 2):
-        n = np.maximum(n, np.maximum(lowest[i] / limits[i][0], highest[i] / limits[i][1]))
-    scale = 2 / (1 + n**2)
+    scale = 2 / (1 + limit_share(lowest, highest, limits) ** 2)
     slack = high - low - scale * (highest[0] - lowest[0])
     mean = low - scale * lowest[0] + slack * (1 + np.sin(z[:, 0])) / 2
     return np.column_stack([mean, scale[:, None] * z[:, 1:]])
+
+
+def limit_share(lowest: Array, highest: Array, limits: tuple[Range, Range, Range]) -> Array:
+    """The size (S,) of harmonics with these extremes (3, S), as a share of the first limit that they reach."""
+    share = (highest[0] - lowest[0]) / (limits[0][1] - limits[0][0])
+    for i in (1, 2):
+        share = np.maximum(share, np.maximum(lowest[i] / limits[i][0], highest[i] / limits[i][1]))
+    return np.asarray(share)
 
 
 def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:

@@ -1,0 +1,108 @@
+"""Limits that couple the joints of an arm: efforts of the joints, and obstacles to its frames.
+
+Their excess is a share of the largest effort, or a depth in m; the limits hold where it is not positive.  Efforts are
+those of the links' weight and inertia.  Obstacles concern the origins of the moving frames, not the bodies of links, so
+a trajectory within these limits need not be free of collisions.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.excitation.fourier import Fourier, motion
+from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, Bodies
+from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.kinematics import frames
+from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
+
+INSTANTS = 10_000  # of a period at which the excess is computed; between them it is bounded
+MIN_TRAVEL = 1e-9  # [m] of a frame that moves; rounding is smaller
+SHRINKAGES = 20  # bisections of the amplitude, to a millionth
+Box = tuple[float, float, float, float, float, float]  # lowest x, y, z and highest x, y, z [m], in base axes
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """Where no frame may be: below a floor, and inside boxes."""
+
+    floor: float = -math.inf  # z [m], in base axes
+    boxes: tuple[Box, ...] = ()
+
+    @property
+    def present(self) -> bool:
+        """Whether there is any obstacle."""
+        return bool(self.boxes) or math.isfinite(self.floor)
+
+    def depth(self, points: Array) -> Array:
+        """The depth (..., 1 + boxes) [m] of points (..., 3) below the floor and inside each box; negative outside."""
+        corners = np.array(self.boxes, float).reshape(-1, 2, 3)
+        inside = np.minimum(points[..., None, :] - corners[:, 0], corners[:, 1] - points[..., None, :]).min(axis=-1)
+        return np.concatenate([np.maximum(self.floor - points[..., 2:], -1e3), inside], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmLimits:
+    """The chain of an arm, its largest efforts (n,) where its bodies are known, and the obstacles around it."""
+
+    chain: Chain
+    bodies: Bodies | None = None
+    efforts: tuple[float, ...] = ()  # of each joint [N m or N], in either direction; infinite without a limit
+    obstacles: Obstacles = Obstacles()
+
+    @property
+    def present(self) -> bool:
+        """Whether anything is limited."""
+        return self._limits_effort or self.obstacles.present
+
+    @property
+    def _limits_effort(self) -> bool:
+        return self.bodies is not None and bool(np.isfinite(self.efforts).any())
+
+    def excess(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """The excess (..., m) over each limit of a motion (..., n); m = 0 without limits."""
+        parts = [np.empty((*q.shape[:-1], 0))]
+        if self._limits_effort and self.bodies is not None:
+            share = inverse_dynamics(self.chain, self.bodies, q, dq, ddq) / np.array(self.efforts)
+            parts += [share - 1, -share - 1]
+        if self.obstacles.present:
+            points = frames(self.chain, q)[..., self._moving, :3, 3]
+            parts += [self.obstacles.depth(points).reshape(*q.shape[:-1], -1)]
+        return np.concatenate(parts, axis=-1)
+
+    def hold(self, q: Array, dq: Array, ddq: Array) -> bool:
+        """Whether the limits hold along a motion (K, n), also between its samples.
+
+        Between two samples the excess is above neither by more than it changes elsewhere from sample to sample.
+        """
+        excess = self.excess(q, dq, ddq)
+        return bool((excess.max(axis=0) + np.abs(np.diff(excess, axis=0)).max(axis=0) <= 0).all())
+
+    @cached_property
+    def _moving(self) -> NDArray[np.intp]:
+        """The frames whose origin moves."""
+        q = np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_SAMPLES, self.chain.n))
+        return np.flatnonzero(np.ptp(frames(self.chain, q)[..., :3, 3], axis=0).max(axis=-1) > MIN_TRAVEL)
+
+
+def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[Fourier] | None:
+    """Shrink all series towards rest at their means until the limits hold at every instant; None if rest breaks one."""
+
+    def shrunk(scale: float) -> list[Fourier]:
+        return [Fourier.from_coefficients(np.r_[s.a0, scale * s.x[1:]], s.period) for s in series]
+
+    def within(scale: float) -> bool:
+        t = np.linspace(0.0, series[0].period, INSTANTS + 1)
+        return limits.hold(*(np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in shrunk(scale)), strict=True)))
+
+    if not limits.present or within(1.0):
+        return list(series)
+    low, high = 0.0, 1.0
+    for _ in range(SHRINKAGES):
+        middle = (low + high) / 2
+        low, high = (middle, high) if within(middle) else (low, middle)
+    return shrunk(low) if low > 0 else None
