@@ -1,6 +1,8 @@
 """Design an excitation trajectory that identifies a joint's parameters best, or evaluate a given one."""
 
 import json
+import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,8 +11,9 @@ import typer
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
+    from davinci_forces.maths.excitation.search import ReportStart
     from davinci_forces.simulation.excitation.request import Answer, ArmExcitation
-    from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory
+    from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory, ExpectedParameter
 
 
 def run(
@@ -28,7 +31,12 @@ def run(
     q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
     dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
     ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Random starting points; half as many if JOINT is `all`.")] = 24,
+    noise: Annotated[
+        str | None, typer.Option(help="Noise of the efforts (std): expect standard errors; one number, or one a joint.")
+    ] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Starts of the search; default 24, or 2 if JOINT is `all`.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random starting points.")] = 0,
     samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
     rate: Annotated[float, typer.Option(help="Sampling rate [Hz] of the table of --csv.")] = 100.0,
@@ -41,18 +49,23 @@ def run(
 ) -> None:
     """Minimise the criterion over Fourier series that keep the limits at every instant.
 
-    Where the best, the median and the worst start differ, more starts may find a better trajectory. All joints of an
-    arm take minutes; a line is printed after each start.
+    All joints of an arm together keep their position, velocity and acceleration limits, the effort limits if the masses
+    are known, and the workspace if the robot states one. Efforts are those of weight and inertia, without friction. The
+    trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
+    find a better trajectory. An arm takes minutes; a line is printed after each start.
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 
-    request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples)
-    answered = answer(request, _say)
+    request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples, noise)
+    answered = answer(request, _progress())
+    limits = answered.arm.limits if answered.arm else None
     try:
         if csv:
-            csv.write_text(trajectory.table(answered.trajectories, rate, run_in), encoding="utf-8", newline="\n")
+            csv.write_text(
+                trajectory.table(answered.trajectories, rate, run_in, limits), encoding="utf-8", newline="\n"
+            )
         if plot:
             trajectory.plot(answered.trajectories, plot)
     except OSError as error:
@@ -60,8 +73,15 @@ def run(
     echo(json.dumps(_document(robot, answered), indent=2) if as_json else _format_text(answered))
 
 
-def _say(start: int, starts: int, value: float) -> None:
-    echo(f"start {start} of {starts}: objective {value:.4f}", err=True)
+def _progress() -> "ReportStart":
+    """A function that prints a line after each start, with the time to go."""
+    began = time.monotonic()
+
+    def say(start: int, starts: int, value: float) -> None:
+        to_go = (time.monotonic() - began) / start * (starts - start)
+        echo(f"start {start} of {starts}: objective {value:.4f}, about {to_go:.0f} s to go", err=True)
+
+    return say
 
 
 def _document(robot: str, answered: "Answer") -> dict[str, Any]:
@@ -73,10 +93,11 @@ def _document(robot: str, answered: "Answer") -> dict[str, Any]:
 
 
 def _totals(arm: "ArmExcitation") -> dict[str, Any]:
-    from davinci_forces.simulation.excitation.trajectory import spread
+    from davinci_forces.simulation.excitation.trajectory import as_facts, spread
 
     numbers = {"objective": arm.objective, "condition": arm.condition, "base_parameters": arm.base_parameters}
-    return {**numbers, "starts": spread(arm.optima)}
+    checked = {"limits_effort": arm.limits.limits_effort, "limits_workspace": arm.limits.obstacles.present}
+    return {**numbers, **checked, "starts": spread(arm.optima), **as_facts(arm.expected)}
 
 
 def _format_text(answered: "Answer") -> str:
@@ -85,7 +106,7 @@ def _format_text(answered: "Answer") -> str:
     if arm:
         base = f"{arm.base_parameters} base parameters"
         lines += [f"all joints: objective {arm.objective:.4f}, condition {arm.condition:.1f}, {base}"]
-        lines += [_spread(_totals(arm)["starts"])]
+        lines += [_spread(_totals(arm)["starts"]), f"  {_checked(arm)}", *_expected(arm.expected)]
     for e in trajectories:
         lines += _lines(e)
     return "\n".join(lines)
@@ -99,7 +120,21 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
     for symbol, (low, high) in facts["ranges"].items():
         lower, upper = facts["limits"][symbol]
         lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
-    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations]
+    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations] + _expected(e.expected)
+
+
+def _checked(arm: "ArmExcitation") -> str:
+    """Which limits of the whole arm hold."""
+    limits = arm.limits
+    effort = "within the effort limits" if limits.limits_effort else "efforts not limited (no limit, or no masses)"
+    workspace = "within the workspace" if limits.obstacles.present else "no workspace stated"
+    return f"{effort}; {workspace}; not checked for collisions"
+
+
+def _expected(parameters: "Sequence[ExpectedParameter]") -> list[str]:
+    """Expected standard errors, one parameter a line."""
+    lines = [f"    {p.name}: {p.std:.3g} {p.unit}" for p in parameters]
+    return ["  expected standard errors, from one period with white noise:", *lines] if lines else []
 
 
 def _spread(starts: dict[str, float | None]) -> str:

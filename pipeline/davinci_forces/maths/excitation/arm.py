@@ -23,14 +23,21 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, GRADIENTS, Fourier, basis, instants
-from davinci_forces.maths.excitation.joint import ExcitationProblem, extremes, impossible, limit_share, shrink_into_limits
-from davinci_forces.maths.excitation.limits import ArmLimits, shrink_into_arm_limits
+from davinci_forces.maths.excitation.joint import (
+    ExcitationProblem,
+    extremes,
+    impossible,
+    limit_share,
+    shrink_into_limits,
+)
+from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_into_arm_limits
 from davinci_forces.maths.excitation.search import ReportStart, ignore_start
-from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, base_parameters
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-EXPLORED = 12  # random trajectories of a start, searched on few samples
+ADDED = ("rotor inertia", "viscous friction", "Coulomb friction")  # parameters of each joint, after those of links
+EXPLORED = 8  # random trajectories of a start, searched on few samples
 REFINED = 3  # the best of them, searched on all samples
 SAMPLES_EXPLORED = 16  # samples for each harmonic: eight in a period of the products of two harmonics
 LIMIT_INSTANTS = 40  # for each harmonic; a peak between two of them is higher by at most (pi / 40)^2 / 2
@@ -75,7 +82,8 @@ class Stage(NamedTuple):
         half = np.ptp(np.array([joint.limits for joint in problem.joints]), axis=-1) / 2  # (n, 3)
         top = 2 * np.pi / period * np.array(harmonics)
         scale = np.min([half[:, 0] * 2 * np.pi / period, half[:, 1], half[:, 2] / top], axis=0)
-        return cls(problem, *([basis(period, N, times) for N in harmonics] for times in (t, dense)), scale)
+        bases, limit_bases = ([basis(period, N, times) for N in harmonics] for times in (t, dense))
+        return cls(problem, bases, limit_bases, scale)
 
     def coefficients(self, z: Array) -> list[Array]:
         """The coefficients of each joint: z in units of its scale, about the middle of its positions."""
@@ -93,22 +101,39 @@ class Stage(NamedTuple):
 
 
 def arm_problem(
-    chain: Chain, joints: Sequence[ExcitationProblem], limits: ArmLimits | None = None
+    chain: Chain,
+    joints: Sequence[ExcitationProblem],
+    bodies: Bodies | None = None,
+    efforts: Sequence[float] = (),
+    obstacles: Obstacles = NO_OBSTACLES,
 ) -> ArmExcitationProblem:
-    """The excitation problem of these joints, with the base parameters of the arm."""
-    moving, _ = fold_fixed_links(chain.with_coordinates(len(joints)), np.zeros((len(chain.parent), 10)))
-    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RANDOM_SAMPLES, len(joints)))
-    F = _columns(moving, q, dq, ddq, np.arange(10 * len(moving.parent) + 3 * len(joints)))
-    columns = base_parameters(F.reshape(-1, F.shape[-1])).columns
-    return ArmExcitationProblem(moving, tuple(joints), columns, limits or ArmLimits(chain))
+    """The excitation problem of these joints, with the base parameters of the arm.
+
+    Largest `efforts` (n,) of the joints count where the bodies of the links are known.
+    """
+    n = len(joints)
+    parameters = np.zeros(10 * len(chain.parent)) if bodies is None else bodies.parameters(n)
+    moving, merged = fold_fixed_links(chain.with_coordinates(n), parameters.reshape(-1, 10))
+    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RANDOM_SAMPLES, n))
+    F = _columns(compiled_regressor(moving, q, dq, ddq), dq, ddq, np.arange(10 * len(moving.parent) + 3 * n))
+    limits = ArmLimits(moving, None if bodies is None else merged.ravel(), tuple(efforts), obstacles)
+    return ArmExcitationProblem(moving, tuple(joints), base_parameters(F.reshape(-1, F.shape[-1])).columns, limits)
 
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    stage = Stage.of(problem, problem.joints[0].samples)
-    return _columns(problem.chain, *stage.motion([s.x for s in series]), problem.columns).reshape(
-        -1, len(problem.columns)
-    )
+    q, dq, ddq = Stage.of(problem, problem.joints[0].samples).motion([s.x for s in series])
+    F = _columns(compiled_regressor(problem.chain, q, dq, ddq), dq, ddq, problem.columns)
+    return F.reshape(-1, len(problem.columns))
+
+
+def parameter_of(problem: ArmExcitationProblem, column: int) -> tuple[int | None, str]:
+    """The name of a column of F, and the index of its joint; None for a parameter of a link."""
+    link, which = divmod(column, 10)
+    if link < len(problem.chain.links):
+        return None, f"{PARAMETERS[which]} of {problem.chain.links[link]}"
+    kind, joint = divmod(column - 10 * len(problem.chain.links), len(problem.joints))
+    return joint, ADDED[kind]
 
 
 def design_together(
@@ -129,9 +154,7 @@ def design_together(
         report_start(start + 1, starts, designs[-1][0])
     value, series = min(designs, key=lambda design: design[0])
     if not np.isfinite(value):
-        raise ValueError(
-            "no trajectory of these harmonics within the limits identifies all base parameters of the arm"
-        )
+        raise ValueError("no trajectory of these harmonics within the limits identifies all base parameters of the arm")
     return ArmDesign(series, np.array([value for value, _ in designs]))
 
 
@@ -189,21 +212,27 @@ def _lagrangian(
 ) -> tuple[float, Array, list[Array]]:
     """The augmented Lagrangian, its gradient by z, and the next multipliers."""
     problem, x = stage.problem, stage.coefficients(z)
-    motion = stage.motion(x)
-    F = _columns(problem.chain, *motion, problem.columns, width)
+    q, dq, ddq = stage.motion(x)
+    Y = compiled_regressor(problem.chain, q, dq, ddq)
+    F = _columns(Y, dq, ddq, problem.columns, width)
     value, dF = GRADIENTS[problem.joints[0].criterion](F.reshape(-1, F.shape[-1]))
     if not np.isfinite(dF).all():
         return HUGE, np.zeros_like(z), multipliers or []
-    dF, excess = dF.reshape(F.shape), problem.limits.excess(*motion)
     before = multipliers or [np.zeros(1)] * (1 + len(x))
-    after = [mu * np.maximum(0.0, excess + before[0] / mu)]
+    after = [mu * np.maximum(0.0, problem.limits.excess(q, Y) + before[0] / mu)]
+    weights = np.zeros((*q.shape, Y.shape[-1] + 3 * len(x)))  # of all columns, as dF is of the base columns
+    weights[..., problem.columns] = dF.reshape(F.shape)
+    of_links = weights[..., : Y.shape[-1]]
+    of_joints = np.einsum("kjcj->ckj", weights[..., Y.shape[-1] :].reshape(*q.shape, 3, len(x)))
 
     def of_sample(q: Array, dq: Array, ddq: Array) -> Array:
-        total = np.einsum("...kjc,kjc->...k", _columns(problem.chain, q, dq, ddq, problem.columns, width), dF)
-        c = problem.limits.excess(q, dq, ddq)
-        return np.asarray(total + mu / 2 * (np.maximum(0.0, c + before[0] / mu) ** 2).sum(axis=-1))
+        Y = compiled_regressor(problem.chain, q, dq, ddq)
+        c = problem.limits.excess(q, Y)
+        added = of_joints[0] * ddq + of_joints[1] * dq + of_joints[2] * np.tanh(dq / width)
+        penalty = mu / 2 * (np.maximum(0.0, c + before[0] / mu) ** 2).sum(axis=-1)
+        return np.asarray(np.einsum("...kjc,kjc->...k", Y, of_links) + added.sum(axis=-1) + penalty)
 
-    slopes, gradient = _slopes(of_sample, motion), []
+    slopes, gradient = _slopes(of_sample, (q, dq, ddq)), []
     for i, (joint, B, Q) in enumerate(zip(problem.joints, stage.bases, stage.limit_bases, strict=True)):
         c, dc = _joint_excess(joint, Q, x[i])
         after.append(mu * np.maximum(0.0, c + before[1 + i] / mu))
@@ -224,9 +253,7 @@ def _slopes(function: Callable[[Array, Array, Array], Array], motion: Sequence[A
     return slopes
 
 
-def _joint_excess(
-    joint: ExcitationProblem, bases: Sequence[Array], x: Array
-) -> tuple[Array, Callable[[Array], Array]]:
+def _joint_excess(joint: ExcitationProblem, bases: Sequence[Array], x: Array) -> tuple[Array, Callable[[Array], Array]]:
     """The excess (6 G,) over a joint's limits, in shares of half their range, and its derivative by x, transposed."""
     rows, bounds = [], []
     for (low, high), B in zip(joint.limits, bases, strict=True):
@@ -237,19 +264,17 @@ def _joint_excess(
     return A @ x - np.concatenate(bounds), lambda weights: weights @ A
 
 
-def _columns(
-    chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None
-) -> Array:
-    """The selected columns (..., n, p) of F; q, dq and ddq are (..., n).  A width (n,) makes the friction smooth.
+def _columns(Y: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None) -> Array:
+    """The selected columns (..., n, p) of F; Y is (..., n, 10 L), dq and ddq are (..., n).
 
-    The 10 L + 3 n columns are the inertial parameters of links, then rotors, viscous and Coulomb friction of joints.
+    The 10 L + 3 n columns are the inertial parameters of links, then rotors, viscous and Coulomb friction of joints.  A
+    width (n,) makes the friction smooth.
     """
-    links = 10 * len(chain.parent)
-    of_links = columns[columns < links]
-    F = np.zeros((*q.shape, len(columns)))
-    F[..., : len(of_links)] = compiled_regressor(chain, q, dq, ddq)[..., of_links]
+    of_links = columns[columns < Y.shape[-1]]
+    F = np.zeros((*dq.shape, len(columns)))
+    F[..., : len(of_links)] = Y[..., of_links]
     sign = np.sign(dq) if width is None else np.tanh(dq / width)
     for i in range(len(of_links), len(columns)):
-        kind, joint = divmod(columns[i] - links, q.shape[-1])
+        kind, joint = divmod(columns[i] - Y.shape[-1], dq.shape[-1])
         F[..., joint, i] = (ddq, dq, sign)[kind][..., joint]
     return F

@@ -28,7 +28,7 @@ PERIOD_SAMPLES = 300  # K, of one period without its end point; this number repr
 # Number of entries of the largest matrix that is factored in one piece: for a larger one, the library starts threads.
 # The matrices here are so small that threads make the search slower, up to 20 times on a busy machine.
 MAX_TRIANGLE_ENTRIES = 8000
-RUN_IN_INSTANTS = 4000  # instants of a run-in at which the limits are checked
+RUN_IN_INSTANTS = 10_000  # instants of a run-in at which the limits are checked
 LIMIT_MARGIN = 1e-5  # margin, as a share of a limit, for peaks between the checked instants
 
 
@@ -163,6 +163,17 @@ def condition_gradient(F: Array) -> tuple[float, Array]:
 GRADIENTS = {"determinant": determinant_gradient, "condition": condition_gradient}
 
 
+def expected_std(F: Array, noise: Array) -> Array:
+    """Standard errors (p,) of least squares on F (K, p) with white `noise` (K,) as weights; infinite without full rank.
+
+    They are the roots of the diagonal of (F^T W F)^-1, with W = diag(1 / noise^2).  (6.31)
+    """
+    R = triangle(F / noise[:, None])
+    if not np.isfinite(condition(R)):
+        return np.full(F.shape[1], np.inf)
+    return np.asarray(np.linalg.norm(np.linalg.inv(R), axis=1))
+
+
 def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (K,) at t (K,) [s] of a run-in, from rest at -duration to full speed at 0."""
     u = 1 + t / duration
@@ -173,10 +184,16 @@ def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Ar
     return q, dsigma * dq, dsigma**2 * ddq + ddsigma * dq
 
 
-def shortest_run_in(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
+Holds = Callable[[Array, Array, Array], bool]  # whether limits that couple the joints hold along a motion (K, n)
+
+
+def shortest_run_in(
+    series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array, hold: Holds | None = None
+) -> float | None:
     """The first of `durations` [s] for which the run-ins of all series keep their limits of acceleration, or None.
 
-    If a series itself exceeds the limits, its run-in may reach the accelerations of the series.
+    If a series itself exceeds the limits, its run-in may reach the accelerations of the series.  `hold` may set limits
+    to the motion of all series together.
     """
     bounds = []
     for joint_series, (low, high) in zip(series, accelerations, strict=True):
@@ -184,7 +201,9 @@ def shortest_run_in(series: Sequence[Fourier], accelerations: Sequence[Range], d
         bounds.append((min(low * (1 - LIMIT_MARGIN), lowest), max(high * (1 - LIMIT_MARGIN), highest)))
     for duration in durations.tolist():
         t = np.linspace(-duration, 0.0, RUN_IN_INSTANTS)
-        joint_ddq = [run_in(joint_series, t, duration)[2] for joint_series in series]
-        if all(low <= ddq.min() and ddq.max() <= high for ddq, (low, high) in zip(joint_ddq, bounds, strict=True)):
+        q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(run_in(s, t, duration) for s in series), strict=True))
+        ranges_of_ddq = zip(bounds, ddq.min(axis=0), ddq.max(axis=0), strict=True)
+        slow = all(low <= least and largest <= high for (low, high), least, largest in ranges_of_ddq)
+        if slow and (hold is None or hold(q, dq, ddq)):
             return float(duration)
     return None

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
-from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, Bodies
+from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames
-from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
+from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
 INSTANTS = 10_000  # of a period at which the excess is computed; between them it is bounded
 MIN_TRAVEL = 1e-9  # [m] of a frame that moves; rounding is smaller
@@ -45,29 +45,33 @@ class Obstacles:
         return np.concatenate([np.maximum(self.floor - points[..., 2:], -1e3), inside], axis=-1)
 
 
+NO_OBSTACLES = Obstacles()
+
+
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
-    """The chain of an arm, its largest efforts (n,) where its bodies are known, and the obstacles around it."""
+    """The chain of an arm, its largest efforts (n,) where its masses are known, and the obstacles around it."""
 
     chain: Chain
-    bodies: Bodies | None = None
+    parameters: Array | None = None  # inertial parameters of the links (10 L,)
     efforts: tuple[float, ...] = ()  # of each joint [N m or N], in either direction; infinite without a limit
-    obstacles: Obstacles = Obstacles()
+    obstacles: Obstacles = NO_OBSTACLES
+
+    @property
+    def limits_effort(self) -> bool:
+        """Whether efforts are limited and can be computed."""
+        return self.parameters is not None and bool(np.isfinite(self.efforts).any())
 
     @property
     def present(self) -> bool:
         """Whether anything is limited."""
-        return self._limits_effort or self.obstacles.present
+        return self.limits_effort or self.obstacles.present
 
-    @property
-    def _limits_effort(self) -> bool:
-        return self.bodies is not None and bool(np.isfinite(self.efforts).any())
-
-    def excess(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """The excess (..., m) over each limit of a motion (..., n); m = 0 without limits."""
+    def excess(self, q: Array, Y: Array) -> Array:
+        """The excess (..., m) over each limit at q (..., n) with regressor Y (..., n, 10 L); m = 0 without limits."""
         parts = [np.empty((*q.shape[:-1], 0))]
-        if self._limits_effort and self.bodies is not None:
-            share = inverse_dynamics(self.chain, self.bodies, q, dq, ddq) / np.array(self.efforts)
+        if self.parameters is not None and self.limits_effort:
+            share = Y @ self.parameters / np.array(self.efforts)
             parts += [share - 1, -share - 1]
         if self.obstacles.present:
             points = frames(self.chain, q)[..., self._moving, :3, 3]
@@ -77,9 +81,9 @@ class ArmLimits:
     def hold(self, q: Array, dq: Array, ddq: Array) -> bool:
         """Whether the limits hold along a motion (K, n), also between its samples.
 
-        Between two samples the excess is above neither by more than it changes elsewhere from sample to sample.
+        Between two samples an excess is above theirs by no more than its largest change from sample to sample.
         """
-        excess = self.excess(q, dq, ddq)
+        excess = self.excess(q, compiled_regressor(self.chain, q, dq, ddq))
         return bool((excess.max(axis=0) + np.abs(np.diff(excess, axis=0)).max(axis=0) <= 0).all())
 
     @cached_property

@@ -9,21 +9,33 @@ import numpy as np
 
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
-from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
-from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.excitation.arm import (
+    ArmExcitationProblem,
+    arm_observation,
+    arm_problem,
+    design_together,
+    parameter_of,
+)
+from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
 from davinci_forces.maths.excitation.joint import ExcitationProblem
+from davinci_forces.maths.excitation.limits import ArmLimits, Obstacles
 from davinci_forces.maths.excitation.search import ReportStart, ignore_start
-from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.maths.models.coupled import LINK_UNITS
+from davinci_forces.maths.models.terms import TERMS
+from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.simulation.excitation.trajectory import (
     PERIODS,
     ExcitationTrajectory,
+    ExpectedParameter,
     coefficient_names,
     design_excitation,
     problem_of,
 )
 from davinci_forces.toml import unlikely
 
-STARTS_OF_ARM = 2  # an arm has one start per this many requested starts, because it takes longer
+STARTS, STARTS_OF_ARM = 24, 2  # an arm's starts take longer, and agree better
+WHOLE_TURN = (-math.pi, math.pi)  # [rad] positions of a revolute joint without limits
 
 
 @dataclass(frozen=True)
@@ -37,9 +49,10 @@ class Request:
     harmonics: int | None
     criterion: str
     limits: tuple[str | None, str | None, str | None]  # of position, velocity and acceleration: "lower,upper"
-    starts: int
+    starts: int | None
     seed: int
     samples: int  # K, samples of a period in the criterion
+    noise: str | None = None  # standard deviation of the effort's noise: of every joint, or one for each
 
 
 class ArmExcitation(NamedTuple):
@@ -49,6 +62,8 @@ class ArmExcitation(NamedTuple):
     condition: float
     base_parameters: int
     optima: tuple[float, ...]
+    limits: ArmLimits
+    expected: tuple[ExpectedParameter, ...]  # standard errors of the base parameters, if noise is stated
 
 
 class Answer(NamedTuple):
@@ -83,42 +98,73 @@ def answer(request: Request, report_start: ReportStart = ignore_start) -> Answer
         raise BadRequest("--evaluate takes one joint; name it instead of `all`")
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
     problems = [_problem(request, joint, period) for joint in joints]
+    noise = _noise(request.noise, len(joints))
     if all_joints and robot.chain is not None:
-        return _of_arm(request, robot, arm_problem(robot.chain, problems), report_start)
-    return Answer([_excitation(request, *pair) for pair in zip(joints, problems, strict=True)])
+        efforts = [joint.limits.effort for joint in joints]
+        obstacles = Obstacles()  # no robot states any
+        arm = arm_problem(robot.chain, problems, robot.bodies, efforts, obstacles)
+        return _of_arm(request, robot, arm, noise, report_start)
+    return Answer([_excitation(request, *part) for part in zip(joints, problems, noise, strict=True)])
 
 
-def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, report_start: ReportStart) -> Answer:
+def _of_arm(
+    request: Request, robot: Robot, problem: ArmExcitationProblem, noise: list[float], report_start: ReportStart
+) -> Answer:
     try:
-        design = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, report_start)
+        design = design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
     F = arm_observation(problem, design.series)
+    value, cond = float(CRITERIA[request.criterion](F)), float(10 ** condition(F))
+    expected = _expected(robot, problem, F, noise) if request.noise else ()
     parts = zip(robot.joints, problem.joints, design.series, strict=True)
     return Answer(
         [ExcitationTrajectory(*part) for part in parts],
-        ArmExcitation(
-            float(CRITERIA[request.criterion](F)), float(10 ** condition(F)), F.shape[-1], tuple(design.optima.tolist())
-        ),
+        ArmExcitation(value, cond, F.shape[-1], tuple(design.optima.tolist()), problem.limits, expected),
     )
+
+
+def _expected(
+    robot: Robot, problem: ArmExcitationProblem, F: Array, noise: list[float]
+) -> tuple[ExpectedParameter, ...]:
+    """The standard errors of the arm's base parameters, each named by the column that it leads with."""
+    std, parameters = expected_std(F, np.tile(noise, len(F) // len(noise))), list[ExpectedParameter]()
+    for column, value in zip(problem.columns.tolist(), std.tolist(), strict=True):
+        joint, name = parameter_of(problem, column)
+        if joint is None:
+            parameters.append(ExpectedParameter(name, LINK_UNITS[column % 10], value))
+        else:
+            unit = robot.joints[joint].unit(TERMS[name.replace("rotor ", "")].unit)
+            parameters.append(ExpectedParameter(f"{name} of {robot.joints[joint].name}", unit, value))
+    return tuple(parameters)
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
     problem = problem_of(joint, period, request.harmonics, request.criterion, request.samples)
     options = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
     q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
+    if joint.kind is Kind.REVOLUTE and not any(map(math.isfinite, q)):
+        q = WHOLE_TURN
     return replace(problem, limits=(q, dq, ddq))
 
 
-def _excitation(request: Request, joint: Joint, problem: ExcitationProblem) -> ExcitationTrajectory:
+def _excitation(request: Request, joint: Joint, problem: ExcitationProblem, noise: float) -> ExcitationTrajectory:
     if request.evaluate is None:
-        return design_excitation(joint, problem, request.starts, request.seed)
+        return replace(design_excitation(joint, problem, request.starts or STARTS, request.seed), noise=noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         names = ",".join(coefficient_names(2))
         raise BadRequest(f"--evaluate takes {names}, or a0 and a pair for each harmonic, not {len(x)} numbers")
     problem = replace(problem, harmonics=(len(x) - 1) // 2)
-    return ExcitationTrajectory(joint, problem, Fourier.from_coefficients(np.array(x), problem.period))
+    return ExcitationTrajectory(joint, problem, Fourier.from_coefficients(np.array(x), problem.period), noise=noise)
+
+
+def _noise(text: str | None, n: int) -> list[float]:
+    """The noise of each joint's effort; 0 if it is not stated."""
+    values = _numbers("--noise", text) if text else [0.0]
+    if len(values) not in (1, n) or (text and min(values) <= 0):
+        raise BadRequest(f"--noise takes one positive number, or {n} for the joints in their order, not {text!r}")
+    return values * n if len(values) == 1 else values
 
 
 def _limits(option: str, text: str) -> Range:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,12 +13,21 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
+from davinci_forces.maths.excitation.limits import ArmLimits
 from davinci_forces.robots.robot import Joint, Kind
 from davinci_forces.toml import unlikely
 
 PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] default periods, from Table 6.1
 PLOTS = (".svg", ".png", ".pdf")
 RUN_INS = 31  # candidate lengths of the run-in, from a quarter of a period to one period
+
+
+class ExpectedParameter(NamedTuple):
+    """A parameter, and the standard error with which one period is expected to identify it."""
+
+    name: str
+    unit: str
+    std: float
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,16 @@ class ExcitationTrajectory:
     problem: ExcitationProblem
     series: fourier.Fourier
     optima: tuple[float, ...] = ()  # the criterion that each start of the search reached
+    noise: float = 0.0  # standard deviation of the effort's noise, or 0 if unknown
+
+    @property
+    def expected(self) -> tuple[ExpectedParameter, ...]:
+        """The standard errors of the parameters, if the noise is known."""
+        if not self.noise:
+            return ()
+        std = fourier.expected_std(self._F(), np.full(self.problem.samples, self.noise)).tolist()
+        terms = zip(self.problem.terms, std, strict=True)
+        return tuple(ExpectedParameter(term.name, self.joint.unit(term.unit), value) for term, value in terms)
 
     @property
     def objective(self) -> float:
@@ -69,10 +88,16 @@ class ExcitationTrajectory:
             "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.violations,
             **({"starts": spread(self.optima)} if self.optima else {}),
+            **as_facts(self.expected),
         }
 
     def _F(self) -> Array:
         return fourier.observation(self.problem.terms, self.series, self.problem.samples)
+
+
+def as_facts(expected: Sequence[ExpectedParameter]) -> dict[str, Any]:
+    """Expected standard errors in JSON's types; nothing without noise."""
+    return {"expected": {p.name: {"std": finite(p.std), "unit": p.unit} for p in expected}} if expected else {}
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
@@ -153,10 +178,13 @@ def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
     axes[-1].set_xlabel("t [s]; dashed: the limits")
 
 
-def table(excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: bool = True) -> str:
+def table(
+    excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: bool = True, limits: ArmLimits | None = None
+) -> str:
     """Write the run-in from rest and one period at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
 
-    The period starts at t = 0, and the run-in has negative times; if `from_rest` is False, there is no run-in.
+    The period starts at t = 0, and the run-in has negative times; if `from_rest` is False, there is no run-in.  The
+    run-in keeps the `limits` of the arm.
 
     Raises
     ------
@@ -164,7 +192,7 @@ def table(excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: b
         If the periods differ, a period is no whole number of samples, or no run-in keeps the limits.
     """
     samples = _samples(excitations, rate)
-    before = _run_in_samples(excitations, samples, rate) if from_rest else 0
+    before = _run_in_samples(excitations, samples, rate, limits) if from_rest else 0
     t = np.arange(-before, samples) / rate
     prefixes = [f"{e.joint.name}." if len(excitations) > 1 else "" for e in excitations]
     header = ",".join(["t", *(f"{p}{symbol}" for p in prefixes for symbol in ("q", "dq", "ddq"))])
@@ -192,15 +220,18 @@ def _samples(excitations: Sequence[ExcitationTrajectory], rate: float) -> int:
     return samples
 
 
-def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, rate: float) -> int:
+def _run_in_samples(
+    excitations: Sequence[ExcitationTrajectory], samples: int, rate: float, limits: ArmLimits | None
+) -> int:
     """The number of samples in the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
-    if duration := fourier.shortest_run_in([e.series for e in excitations], accelerations, durations):
+    hold = limits.hold if limits and limits.present else None
+    if duration := fourier.shortest_run_in([e.series for e in excitations], accelerations, durations, hold):
         return round(duration * rate)
     raise BadRequest(
-        "no run-in of at most one period keeps the acceleration limits; write the period alone, with --no-run-in, and "
-        "move to its start by other means"
+        "no run-in of at most one period keeps the limits of acceleration, effort and workspace; write the period "
+        "alone, with --no-run-in, and move to its start by other means"
     )
 
 
