@@ -74,7 +74,7 @@ class ArmLimits:
             share = Y @ self.parameters / np.array(self.efforts)
             parts += [share - 1, -share - 1]
         if self.obstacles.present:
-            points = frames(self.chain, q)[..., self._moving, :3, 3]
+            points = frames(self.chain, q)[..., :3, 3][..., self._moving, :]
             parts += [self.obstacles.depth(points).reshape(*q.shape[:-1], -1)]
         return np.concatenate(parts, axis=-1)
 
