@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from davinci_forces.commands import excite
 from davinci_forces.errors import BadRequest, BadRobot
+from tests.simulation.six_joints import write
 
 PITCH = "-0.1912,0.2861,-0.0639,0.1741,0.3701"
 app = typer.Typer()
@@ -182,3 +183,38 @@ def test_an_unknown_joint_is_answered_with_the_joints_there_are():
 def test_a_robot_of_a_laboratory_can_be_excited_too(laboratory):
     found = json.loads(call(laboratory, "shoulder", "--starts", "2", "--json"))
     assert found["within_limits"] is True
+
+
+def test_an_arm_of_a_urdf_is_excited_with_the_errors_that_it_may_expect(tmp_path):
+    words = (str(write(tmp_path, 2)), "all", "--starts", "1", "--harmonics", "2", "--samples", "40")
+    found = json.loads(call(*words, "--json", "--noise", "1,2", "--csv", str(tmp_path / "a.csv")))
+    twice = json.loads(call(*words, "--json", "--noise", "2,4"))
+    assert (found["limits_effort"], found["limits_workspace"], found["starts"]["number"]) == (True, False, 1)
+    assert len(found["expected"]) == found["base_parameters"]
+    assert found["expected"]["Coulomb friction of lift"]["unit"] == "N m"
+    for name, parameter in found["expected"].items():
+        assert twice["expected"][name]["std"] == pytest.approx(2 * parameter["std"])
+    text = call(*words, "--noise", "1")
+    assert "within the effort limits; no workspace stated; not checked for collisions" in text
+    assert "viscous friction of pan: " in text
+
+
+def test_the_errors_of_one_joint_fall_with_the_root_of_the_samples():
+    few, many = (
+        json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--noise", "0.2", "--samples", k, "--json"))
+        for k in ("300", "1200")
+    )
+    assert few["expected"]["inertia"]["std"] == pytest.approx(2 * many["expected"]["inertia"]["std"], rel=0.01)
+    assert few["expected"]["inertia"]["unit"] == "kg m^2"
+
+
+def test_a_joint_that_turns_without_limits_is_excited_within_one_turn(tmp_path):
+    (tmp_path / "arm.toml").write_text(ARM.replace("q = [-1.0, 1.0], ", ""))
+    found = json.loads(call(str(tmp_path / "arm.toml"), "shoulder", "--starts", "1", "--json"))
+    assert found["limits"]["q"] == pytest.approx([-np.pi, np.pi])
+
+
+@pytest.mark.parametrize("noise", ["0", "-1", "1,2", "x"])
+def test_noise_is_positive_and_one_or_one_for_each_joint(noise):
+    with pytest.raises(BadRequest, match="--noise"):
+        call("davinci", "hand_pitch", "--evaluate", PITCH, "--noise", noise)
