@@ -69,7 +69,7 @@ def assert_limits_hold(robot, problem, series, obstacles):
 
 @pytest.mark.parametrize("criterion", ["determinant", "condition"])
 def test_the_gradient_of_the_search_is_that_of_differences(six, criterion):
-    stage = search.Stage.of(problem_of(six, criterion=criterion, samples=40), 40)
+    stage = search.Stage.with_samples(problem_of(six, criterion=criterion, samples=40), 40)
     z = 1.3 * search._random(stage, np.random.default_rng(0))
     along = np.random.default_rng(1).normal(size=z.shape)
 

@@ -190,10 +190,10 @@ def test_an_arm_of_a_urdf_is_excited_with_the_errors_that_it_may_expect(tmp_path
     found = json.loads(call(*words, "--json", "--noise", "1,2", "--csv", str(tmp_path / "a.csv")))
     twice = json.loads(call(*words, "--json", "--noise", "2,4"))
     assert (found["limits_effort"], found["limits_workspace"], found["starts"]["number"]) == (True, False, 1)
-    assert len(found["expected"]) == found["base_parameters"]
-    assert found["expected"]["Coulomb friction of lift"]["unit"] == "N m"
-    for name, parameter in found["expected"].items():
-        assert twice["expected"][name]["std"] == pytest.approx(2 * parameter["std"])
+    assert len(found["standard_errors"]) == found["base_parameters"]
+    assert found["standard_errors"]["Coulomb friction of lift"]["unit"] == "N m"
+    for name, parameter in found["standard_errors"].items():
+        assert twice["standard_errors"][name]["std"] == pytest.approx(2 * parameter["std"])
     text = call(*words, "--noise", "1")
     assert "within the effort limits; no workspace stated; not checked for collisions" in text
     assert "viscous friction of pan: " in text
@@ -204,8 +204,10 @@ def test_the_errors_of_one_joint_fall_with_the_root_of_the_samples():
         json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--noise", "0.2", "--samples", k, "--json"))
         for k in ("300", "1200")
     )
-    assert few["expected"]["inertia"]["std"] == pytest.approx(2 * many["expected"]["inertia"]["std"], rel=0.01)
-    assert few["expected"]["inertia"]["unit"] == "kg m^2"
+    assert few["standard_errors"]["inertia"]["std"] == pytest.approx(
+        2 * many["standard_errors"]["inertia"]["std"], rel=0.01
+    )
+    assert few["standard_errors"]["inertia"]["unit"] == "kg m^2"
 
 
 def test_a_joint_that_turns_without_limits_is_excited_within_one_turn(tmp_path):

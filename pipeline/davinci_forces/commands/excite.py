@@ -97,7 +97,7 @@ def _totals(arm: "ArmExcitation") -> dict[str, Any]:
 
     numbers = {"objective": arm.objective, "condition": arm.condition, "base_parameters": arm.base_parameters}
     checked = {"limits_effort": arm.limits.limits_effort, "limits_workspace": arm.limits.obstacles.present}
-    return {**numbers, **checked, "starts": spread(arm.optima), **as_facts(arm.expected)}
+    return {**numbers, **checked, "starts": spread(arm.optima), **as_facts(arm.standard_errors)}
 
 
 def _format_text(answered: "Answer") -> str:
@@ -106,7 +106,7 @@ def _format_text(answered: "Answer") -> str:
     if arm:
         base = f"{arm.base_parameters} base parameters"
         lines += [f"all joints: objective {arm.objective:.4f}, condition {arm.condition:.1f}, {base}"]
-        lines += [_spread(_totals(arm)["starts"]), f"  {_checked(arm)}", *_expected(arm.expected)]
+        lines += [_spread(_totals(arm)["starts"]), f"  {_checked(arm)}", *_error_lines(arm.standard_errors)]
     for e in trajectories:
         lines += _lines(e)
     return "\n".join(lines)
@@ -120,7 +120,7 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
     for symbol, (low, high) in facts["ranges"].items():
         lower, upper = facts["limits"][symbol]
         lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
-    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations] + _expected(e.expected)
+    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations] + _error_lines(e.standard_errors)
 
 
 def _checked(arm: "ArmExcitation") -> str:
@@ -131,7 +131,7 @@ def _checked(arm: "ArmExcitation") -> str:
     return f"{effort}; {workspace}; not checked for collisions"
 
 
-def _expected(parameters: "Sequence[ExpectedParameter]") -> list[str]:
+def _error_lines(parameters: "Sequence[ExpectedParameter]") -> list[str]:
     """Expected standard errors, one parameter a line."""
     lines = [f"    {p.name}: {p.std:.3g} {p.unit}" for p in parameters]
     return ["  expected standard errors, from one period with white noise:", *lines] if lines else []

@@ -4,8 +4,8 @@
 
 Dependent columns are omitted, so that the criterion refers to the base parameters of the arm.
 
-The search follows the gradient.  A criterion f(F) has a gradient df/dF, and each row of F depends on the motion at one
-instant only, so that few perturbed motions give the gradient by all coefficients:
+The search follows the gradient of a criterion f(F).  Each row of F depends on the motion at one instant only.  So few
+perturbed motions give the gradient by all coefficients:
 
     df = sum_k  trace((df/dF_k)' dF_k),    F_k = F(q(t_k), dq(t_k), ddq(t_k))
 
@@ -36,7 +36,11 @@ from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bo
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-ADDED = ("rotor inertia", "viscous friction", "Coulomb friction")  # parameters of each joint, after those of links
+JOINT_PARAMETERS = (
+    "rotor inertia",
+    "viscous friction",
+    "Coulomb friction",
+)  # parameters of each joint, after those of links
 EXPLORED = 8  # random trajectories of a start, searched on few samples
 REFINED = 3  # the best of them, searched on all samples
 SAMPLES_EXPLORED = 16  # samples for each harmonic: eight in a period of the products of two harmonics
@@ -75,7 +79,7 @@ class Stage(NamedTuple):
     scale: Array  # of the velocity of each joint (n,)
 
     @classmethod
-    def of(cls, problem: ArmExcitationProblem, samples: int) -> "Stage":
+    def with_samples(cls, problem: ArmExcitationProblem, samples: int) -> "Stage":
         """The stage whose criterion has this many samples."""
         period, harmonics = problem.joints[0].period, [joint.harmonics for joint in problem.joints]
         t, dense = instants(period, samples), instants(period, LIMIT_INSTANTS * max(harmonics))
@@ -122,7 +126,7 @@ def arm_problem(
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    q, dq, ddq = Stage.of(problem, problem.joints[0].samples).motion([s.x for s in series])
+    q, dq, ddq = Stage.with_samples(problem, problem.joints[0].samples).motion([s.x for s in series])
     F = _columns(compiled_regressor(problem.chain, q, dq, ddq), dq, ddq, problem.columns)
     return F.reshape(-1, len(problem.columns))
 
@@ -133,7 +137,7 @@ def parameter_of(problem: ArmExcitationProblem, column: int) -> tuple[int | None
     if link < len(problem.chain.links):
         return None, f"{PARAMETERS[which]} of {problem.chain.links[link]}"
     kind, joint = divmod(column - 10 * len(problem.chain.links), len(problem.joints))
-    return joint, ADDED[kind]
+    return joint, JOINT_PARAMETERS[kind]
 
 
 def design_together(
@@ -161,7 +165,7 @@ def design_together(
 def _design(problem: ArmExcitationProblem, random: np.random.Generator) -> tuple[float, list[Fourier]]:
     """The best trajectory of one start, and its criterion: explore many, refine a few, finish the best."""
     K, N = problem.joints[0].samples, max(joint.harmonics for joint in problem.joints)
-    coarse, fine = Stage.of(problem, min(K, SAMPLES_EXPLORED * N)), Stage.of(problem, K)
+    coarse, fine = Stage.with_samples(problem, min(K, SAMPLES_EXPLORED * N)), Stage.with_samples(problem, K)
     explored = [_descend(coarse, _random(coarse, random), 0, EXPLORATION)[0] for _ in range(EXPLORED)]
     explored.sort(key=lambda z: _result(fine, z)[0])
     refined = [_descend(fine, z, 0, SELECTION) for z in explored[:REFINED]]

@@ -21,7 +21,7 @@ from davinci_forces.maths.mechanics.kinematics import frames
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
 INSTANTS = 10_000  # of a period at which the excess is computed; between them it is bounded
-MIN_TRAVEL = 1e-9  # [m] of a frame that moves; rounding is smaller
+MIN_FRAME_TRAVEL = 1e-9  # [m] of a frame that moves; rounding is smaller
 SHRINKAGES = 20  # bisections of the amplitude, to a millionth
 Box = tuple[float, float, float, float, float, float]  # lowest x, y, z and highest x, y, z [m], in base axes
 
@@ -90,7 +90,7 @@ class ArmLimits:
     def _moving(self) -> NDArray[np.intp]:
         """The frames whose origin moves."""
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_SAMPLES, self.chain.n))
-        return np.flatnonzero(np.ptp(frames(self.chain, q)[..., :3, 3], axis=0).max(axis=-1) > MIN_TRAVEL)
+        return np.flatnonzero(np.ptp(frames(self.chain, q)[..., :3, 3], axis=0).max(axis=-1) > MIN_FRAME_TRAVEL)
 
 
 def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[Fourier] | None:
@@ -99,14 +99,14 @@ def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list
     def shrunk(scale: float) -> list[Fourier]:
         return [Fourier.from_coefficients(np.r_[s.a0, scale * s.x[1:]], s.period) for s in series]
 
-    def within(scale: float) -> bool:
+    def hold_at(scale: float) -> bool:
         t = np.linspace(0.0, series[0].period, INSTANTS + 1)
         return limits.hold(*(np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in shrunk(scale)), strict=True)))
 
-    if not limits.present or within(1.0):
+    if not limits.present or hold_at(1.0):
         return list(series)
     low, high = 0.0, 1.0
     for _ in range(SHRINKAGES):
         middle = (low + high) / 2
-        low, high = (middle, high) if within(middle) else (low, middle)
+        low, high = (middle, high) if hold_at(middle) else (low, middle)
     return shrunk(low) if low > 0 else None

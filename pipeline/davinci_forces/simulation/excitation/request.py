@@ -63,7 +63,7 @@ class ArmExcitation(NamedTuple):
     base_parameters: int
     optima: tuple[float, ...]
     limits: ArmLimits
-    expected: tuple[ExpectedParameter, ...]  # standard errors of the base parameters, if noise is stated
+    standard_errors: tuple[ExpectedParameter, ...]  # standard errors of the base parameters, if noise is stated
 
 
 class Answer(NamedTuple):
@@ -116,15 +116,15 @@ def _of_arm(
         raise BadRequest(f"{robot.name}: {error}") from None
     F = arm_observation(problem, design.series)
     value, cond = float(CRITERIA[request.criterion](F)), float(10 ** condition(F))
-    expected = _expected(robot, problem, F, noise) if request.noise else ()
+    standard_errors = _standard_errors(robot, problem, F, noise) if request.noise else ()
     parts = zip(robot.joints, problem.joints, design.series, strict=True)
     return Answer(
         [ExcitationTrajectory(*part) for part in parts],
-        ArmExcitation(value, cond, F.shape[-1], tuple(design.optima.tolist()), problem.limits, expected),
+        ArmExcitation(value, cond, F.shape[-1], tuple(design.optima.tolist()), problem.limits, standard_errors),
     )
 
 
-def _expected(
+def _standard_errors(
     robot: Robot, problem: ArmExcitationProblem, F: Array, noise: list[float]
 ) -> tuple[ExpectedParameter, ...]:
     """The standard errors of the arm's base parameters, each named by the column that it leads with."""

@@ -41,7 +41,7 @@ class ExcitationTrajectory:
     noise: float = 0.0  # standard deviation of the effort's noise, or 0 if unknown
 
     @property
-    def expected(self) -> tuple[ExpectedParameter, ...]:
+    def standard_errors(self) -> tuple[ExpectedParameter, ...]:
         """The standard errors of the parameters, if the noise is known."""
         if not self.noise:
             return ()
@@ -88,16 +88,20 @@ class ExcitationTrajectory:
             "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.violations,
             **({"starts": spread(self.optima)} if self.optima else {}),
-            **as_facts(self.expected),
+            **as_facts(self.standard_errors),
         }
 
     def _F(self) -> Array:
         return fourier.observation(self.problem.terms, self.series, self.problem.samples)
 
 
-def as_facts(expected: Sequence[ExpectedParameter]) -> dict[str, Any]:
+def as_facts(standard_errors: Sequence[ExpectedParameter]) -> dict[str, Any]:
     """Expected standard errors in JSON's types; nothing without noise."""
-    return {"expected": {p.name: {"std": finite(p.std), "unit": p.unit} for p in expected}} if expected else {}
+    return (
+        {"standard_errors": {p.name: {"std": finite(p.std), "unit": p.unit} for p in standard_errors}}
+        if standard_errors
+        else {}
+    )
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
