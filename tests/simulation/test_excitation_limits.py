@@ -128,6 +128,25 @@ def test_a_motion_is_shrunk_until_efforts_and_obstacles_hold_at_every_instant(si
     assert shrink_into_arm_limits(problem.limits, below) is None
 
 
+def test_a_motion_is_shrunk_until_efforts_just_hold(six):
+    rest = np.array([0.0, -1.2, 0.4, -0.8, 0.5, 0.0])
+    still = np.zeros(6)
+    efforts = np.abs(inverse_dynamics(six.chain, six.bodies, rest, still, still)) + 10.0
+    joints = [
+        replace(joint, limits=replace(joint.limits, effort=effort))
+        for joint, effort in zip(six.joints, efforts.tolist(), strict=True)
+    ]
+    weak = replace(six, joints=tuple(joints))
+    problem = problem_of(weak, obstacles=Obstacles())
+    series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 0.2)], 10.0) for a0 in rest]
+    within = shrink_into_arm_limits(problem.limits, series)
+    assert within is not None
+    assert_limits_hold(weak, problem, within, Obstacles())
+    t = np.linspace(0.0, 10.0, 10_001)
+    moved = (np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in within), strict=True))
+    assert (np.abs(inverse_dynamics(six.chain, six.bodies, *moved)) / efforts).max() == pytest.approx(1.0, abs=0.01)
+
+
 def test_points_are_deep_below_the_floor_and_inside_boxes():
     points = np.array([[0.5, 0.0, 0.2], [0.5, 0.0, 0.6], [0.5, 0.0, 0.01]])
     assert WORKSPACE.depth(points) == pytest.approx(np.array([[-0.15, 0.1], [-0.55, -0.1], [0.04, 0.01]]))
