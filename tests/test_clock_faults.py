@@ -227,13 +227,13 @@ def test_topics_of_several_rates_in_one_table_are_slower_channels_of_which_nothi
 def test_times_in_ms_us_and_ns_since_1970_are_no_seconds(lab: Path, unit: float) -> None:
     t = 0.01 * np.arange(500)
     stamps = np.rint((1.76e9 + t + np.where(t < 3, 0, 2.5)) / unit).astype(np.int64)
-    pd.DataFrame({"t": stamps, "q": motion(t)[0], "tau": motion(t)[1]}).to_csv(lab / "run.csv", index=False)
-    describe(lab)
+    pd.DataFrame({"t": stamps, "q": motion(t)[0], "tau": motion(t)[1]}).to_parquet(lab / "run.parquet")
+    describe(lab, 'file = "run.parquet"')
     call("ingest", lab)
     assert_allclose(read(lab, "Recording")[0]["t"], t, atol=1e-6)
     assert f"the times in 't' are read in units of {unit:g} s since 1970, not in seconds" in remarks(lab)
     assert "by 2.5 s after 2.990 s" in remarks(lab)
-    describe(lab, channels=OF_TEXT.replace('"t"', '{ channel = "t", unit = "s" }'))
+    describe(lab, 'file = "run.parquet"', OF_TEXT.replace('"t"', '{ channel = "t", unit = "s" }'))
     assert "which is no date; correct the unit of time" in " ".join(call("ingest", lab, code=1).split())
 
 

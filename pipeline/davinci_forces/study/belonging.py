@@ -20,7 +20,7 @@ from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study.guessing import Holding, Meaning, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
-from davinci_forces.study.timing import Timing, samples_of
+from davinci_forces.study.timing import TimeGuess, samples_of
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
 
@@ -199,5 +199,5 @@ def guess_joined(log: Joined) -> Holding:
     holding = with_motion(log, Holding(meanings, joints), samples, unnamed=True)
     if len(set(times)) == 1 and times[0] is not None:
         reason = "it increases throughout in every file; in seconds"
-        holding = replace(holding, timing=Timing(str(times[0]), reason=reason))
+        holding = replace(holding, timing=TimeGuess(str(times[0]), reason=reason))
     return holding

@@ -23,7 +23,7 @@ from davinci_forces.study.names import (
     symbol_of,
     words_of,
 )
-from davinci_forces.study.timing import MAX_CHANNELS, Timing, has_clock, named_time, samples_of, timing_of
+from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i")
@@ -31,7 +31,7 @@ POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "
 
 @dataclass(frozen=True)
 class Meaning:
-    """What one channel holds: a symbol of a joint, counted from 0, the reason, and the unit that a recorder is known to use."""
+    """What one channel holds: a symbol of a joint, counted from 0, the reason, and the unit usual with its recorder."""
 
     symbol: str
     joint: int
@@ -47,7 +47,7 @@ class Holding:
     joints: int = 0
     labels: tuple[str, ...] = ()  # of the joints, where names have words for them
     robot: Robot | None = None  # whose joints the names name
-    timing: Timing = field(default_factory=Timing)
+    timing: TimeGuess = field(default_factory=TimeGuess)
     moving: tuple[int, ...] = ()  # joints, counted from 0
     repeats: bool = False
     steady: bool = False
@@ -104,7 +104,7 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
         samples = {name: samples_of(log, [name])[name] for name in times}
         timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
         by_name = timing.missing and times and not has_clock(log)
-        return Holding(timing=Timing(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
+        return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
     return _by_content(log, [channel.name for channel in numbers])
 
 

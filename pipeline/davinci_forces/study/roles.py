@@ -31,7 +31,7 @@ WIDER = 1.2  # times the range of the logs before: a motion that reaches farther
 
 
 @dataclass(frozen=True)
-class Recording:
+class Evidence:
     """What is known of a log: its name, its folders and file as one text, its guessed content."""
 
     name: str
@@ -49,7 +49,7 @@ class Role(NamedTuple):
     mass: float = 0.0
 
 
-def roles_of(recordings: Sequence[Recording]) -> list[Role]:
+def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     """Guess the role of each log: by a word of its file or folders, else by its motion and effort among others."""
     words = [_word(recording.path) for recording in recordings]
     if len(words) > 1 and all(word[0] == "test" for word in words):
@@ -81,7 +81,7 @@ def _word(path: str) -> tuple[str, str]:
     return "", ""
 
 
-def _by_word(recording: Recording, kind: str, word: str) -> Role | None:
+def _by_word(recording: Evidence, kind: str, word: str) -> Role | None:
     """The role that a word tells; None where the motion has to tell it."""
     reason = f'"{word}" in its name'
     if kind == "clash":
@@ -121,7 +121,7 @@ def _unlike(holding: Holding, references: Sequence[Holding]) -> str:
 
 
 def _by_motion(
-    recordings: Sequence[Recording], rest: Sequence[int], fixed: Sequence[int], tested: Sequence[bool]
+    recordings: Sequence[Evidence], rest: Sequence[int], fixed: Sequence[int], tested: Sequence[bool]
 ) -> dict[int, Role]:
     """Identify from the motions that repeat and reach farthest, then from any that add joints; test on the others."""
     reach: dict[int, tuple[float, str]] = {}
@@ -156,7 +156,7 @@ def _by_motion(
 
 
 def _not_repeating(
-    recordings: Sequence[Recording], late: Sequence[int], reach: dict[int, tuple[float, str]], is_tested: bool
+    recordings: Sequence[Evidence], late: Sequence[int], reach: dict[int, tuple[float, str]], is_tested: bool
 ) -> dict[int, Role]:
     """Identify from motions that do not repeat where none does; the shortest whose joints others move is the test."""
     why = "it moves joints that no log with a repeating motion moves" if reach else "no log has a motion that repeats"
@@ -185,12 +185,12 @@ def _size(holding: Holding) -> tuple[float, float]:
     return -len(holding.moving), -sum(_spans(holding).values())
 
 
-def _cover(reach: dict[int, tuple[float, str]], recording: Recording) -> None:
+def _cover(reach: dict[int, tuple[float, str]], recording: Evidence) -> None:
     for joint, span in _spans(recording.holding).items():
         reach[joint] = max(reach.get(joint, (0.0, "")), (span, recording.name))
 
 
-def _with_identification(recordings: Sequence[Recording], roles: list[Role]) -> list[Role]:
+def _with_identification(recordings: Sequence[Evidence], roles: list[Role]) -> list[Role]:
     """Where no log identifies, take the free motion that reaches farthest."""
     free = [i for i, role in enumerate(roles) if role.role == "validation" and recordings[i].holding.moving]
     if free and not any(role.role == "identification" for role in roles):

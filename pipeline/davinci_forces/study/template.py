@@ -22,7 +22,7 @@ from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, is_tissue, tis
 from davinci_forces.study.entries import ROLES
 from davinci_forces.study.guessing import Holding, Meaning, guess
 from davinci_forces.study.names import is_time, stated_unit
-from davinci_forces.study.roles import Recording, Role, roles_of
+from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
@@ -146,11 +146,11 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) and not holding.meanings else {})
 
 
-def _recording(draft: DraftLog, folder: Path, robot: Robot) -> Recording:
+def _recording(draft: DraftLog, folder: Path, robot: Robot) -> Evidence:
     path = draft.files[0].resolve().relative_to(folder.resolve())
     moving = [robot.joints[k].kind for k in draft.guess.moving if k < len(robot.joints)]
     text = (path.parent / draft.files[0].name.partition(".")[0]).as_posix()
-    return Recording(draft.name, text, draft.guess, bool(draft.touching), Kind.PRISMATIC in moving)
+    return Evidence(draft.name, text, draft.guess, bool(draft.touching), Kind.PRISMATIC in moving)
 
 
 def _distinct(drawn: Sequence[DraftLog]) -> Iterator[tuple[DraftLog, str]]:

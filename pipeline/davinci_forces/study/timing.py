@@ -37,7 +37,7 @@ class VelocityRatio(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Timing:
+class TimeGuess:
     """The time channel of a log or its rate, with the reason; `missing` says why neither is known."""
 
     time: str = ""
@@ -95,7 +95,7 @@ def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> Ve
     )
 
 
-def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing:
+def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> TimeGuess:
     """Guess the times of a log from the first samples of its channels, and from position and velocity of its joints.
 
     `unnamed`: names tell nothing, so that the first channel that rises may be the time.
@@ -114,8 +114,10 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
         return next((timing for timing in known if timing.time), known[0])
     if per_sample is not None:
         rate = columns.round_rate(per_sample.ratio)
-        return Timing(rate=rate, reason="at which the velocities match the derivatives of the positions", step=1 / rate)
-    return Timing(missing="no channel is a time, and no velocity tells the rate")
+        return TimeGuess(
+            rate=rate, reason="at which the velocities match the derivatives of the positions", step=1 / rate
+        )
+    return TimeGuess(missing="no channel is a time, and no velocity tells the rate")
 
 
 def _rises(t: Array) -> bool:
@@ -127,7 +129,7 @@ def _step(t: Array) -> float:
     return float(t[-1] - t[0]) / (len(t) - 1)
 
 
-def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing | None:
+def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> TimeGuess | None:
     """The times of a channel in the unit that it states or that its values tell; None where it only counts samples."""
     known = size(channel.unit) if measures(channel.unit) == "time" else 0.0
     strict = np.concatenate([[True], np.diff(t) > 0])
@@ -143,41 +145,41 @@ def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]],
         sizes = [s for s in SIZES.values() if MIN_RATE <= 1 / (_step(t) * s) <= MAX_RATE]
         if not (1.0 in sizes or len(sizes) == 1) or (sizes[0] != 1.0 and not slope):
             unit_list = " or ".join(f"{name} ({1 / (_step(t) * s):.4g} Hz)" for name, s in SIZES.items() if s in sizes)
-            return Timing(missing=f"channel {channel.name!r} is a time of unknown unit: {unit_list or 'none fits'}")
+            return TimeGuess(missing=f"channel {channel.name!r} is a time of unknown unit: {unit_list or 'none fits'}")
     seconds = sizes[0]
     rate = 1 / (_step(t) * seconds)
     how = "" if known else " by its size since 1970" if since else " by the velocities" if seconds != 1.0 else ""
     name = next((name for name, s in SIZES.items() if s == seconds), "")
     what = f"{shape} ({rate:.6g} Hz if it is in seconds)" if unnamed and not how else f"{shape}, {rate:.6g} Hz"
-    timing = Timing(channel.name, seconds, what + (f"; in {name}{how}" if how else ""), step=_step(t) * seconds)
+    timing = TimeGuess(channel.name, seconds, what + (f"; in {name}{how}" if how else ""), step=_step(t) * seconds)
     return _timing_agreed(timing, slope and slope._replace(ratio=slope.ratio * seconds), rate, channel.name)
 
 
-def _timing_agreed(timing: Timing, slope: VelocityRatio | None, rate: float, name: str) -> Timing:
+def _timing_agreed(timing: TimeGuess, slope: VelocityRatio | None, rate: float, name: str) -> TimeGuess:
     """Times as they are where velocities agree; in degrees what that explains; else no times, and both rates said."""
     if slope is None or slope.agrees(1.0):
         return timing
     units = tuple(key for key, ratio in RATIOS.items() if slope.agrees(ratio))
     if units:
-        return Timing(**vars(timing) | {"units": units})
+        return TimeGuess(**vars(timing) | {"units": units})
     fitted = columns.round_rate(slope.ratio * rate)
     clash = f"by {name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
-    return Timing(missing=f"{clash}: write rate = {fitted:g}, or time = {name!r}", step=timing.step)
+    return TimeGuess(missing=f"{clash}: write rate = {fitted:g}, or time = {name!r}", step=timing.step)
 
 
 def _timing_of_format(
     log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], slope: VelocityRatio | None
-) -> Timing:
+) -> TimeGuess:
     """The clock of a format, with a remark where the velocities tell another rate."""
     t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
     step = log.clock.step if log.clock else _step(t) if len(t) > 1 else 0.0
-    timing = Timing(step=step)
+    timing = TimeGuess(step=step)
     if not step or slope is None or slope.agrees(1 / step):
         return timing
     fitted = columns.round_rate(slope.ratio)
     unit = next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None)
     if unit:
-        return Timing(step=step, units=(unit,))
-    return Timing(
+        return TimeGuess(step=step, units=(unit,))
+    return TimeGuess(
         step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
     )

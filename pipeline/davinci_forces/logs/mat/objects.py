@@ -22,10 +22,10 @@ from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import NUMBER_KINDS
 from davinci_forces.maths.arrays import Array, Integers
 
-HEADER = 128  # [bytes] of a file
+MAT_HEADER_BYTES = 128  # [bytes] of a file
 HEAD = 4096  # [bytes] of an element, which hold its name, its class and the numbers of its objects
 COMPRESSED, TEXT, SPARSE, FUNCTION, OPAQUE = 15, 4, 5, 16, 17
-NUMBERS = range(6, 16)  # classes: double, single, and the integers
+NUMBER_CLASSES = range(6, 16)  # classes: double, single, and the integers
 OBJECT_MARK = 0xDD000000  # before the numbers of objects
 MAX_OBJECTS = 1000
 UNNAMED = "__function_workspace__"  # scipy's name of an element without one
@@ -51,7 +51,7 @@ def elements(path: Path) -> Iterator[Element]:
         If the file ends within a variable.
     """
     with open_file(path) as file:
-        order = _order(file.read(HEADER)[126:])
+        order = _order(file.read(MAT_HEADER_BYTES)[126:])
         size = path.stat().st_size
         while tag := file.read(8):
             kind, length = struct.unpack(f"{order}II", tag)
@@ -137,7 +137,7 @@ class Objects:
     def header(self) -> bytes:
         """The header of the file, with the byte order."""
         with open_file(self.path) as file:
-            return file.read(HEADER)
+            return file.read(MAT_HEADER_BYTES)
 
     @cached_property
     def cells(self) -> Any:
@@ -146,7 +146,7 @@ class Objects:
         (position,) = struct.unpack(f"{order}Q", self.header[116:124])
         with open_file(self.path) as file:
             size = self.path.stat().st_size
-            file.seek(position if HEADER <= position < size else size)
+            file.seek(position if MAT_HEADER_BYTES <= position < size else size)
             tag = file.read(8)
             if len(tag) < 8 or (length := struct.unpack(f"{order}II", tag)[1]) > size:
                 raise ValueError("the file holds no properties of objects")

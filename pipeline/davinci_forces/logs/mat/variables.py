@@ -17,7 +17,7 @@ from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_o
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.logs.mat.objects import (
     FUNCTION,
-    NUMBERS,
+    NUMBER_CLASSES,
     OPAQUE,
     SPARSE,
     TEXT,
@@ -68,12 +68,12 @@ def _of_matlab(path: Path, log: Log) -> Iterator[NamedArray]:
     with open_file(path) as file:
         is_old = 0 in file.read(4)  # version 4 begins with numbers, later ones with text
     variables = elements(path) if not is_old else [
-        Element(name, TEXT if kind == "char" else NUMBERS[0], shape)
+        Element(name, TEXT if kind == "char" else NUMBER_CLASSES[0], shape)
         for name, shape, kind in whosmat(path, appendmat=False)
     ]  # fmt: skip
     reader = _Reader(log, Objects(path))
     for variable in variables:
-        if variable.kind in NUMBERS or variable.kind == SPARSE:
+        if variable.kind in NUMBER_CLASSES or variable.kind == SPARSE:
             yield NamedArray(variable.name, Variable(path, variable.name, variable.shape))
         elif variable.kind == FUNCTION:
             log.warnings.append(f"{variable.name} is a function of MATLAB, which holds no samples, and is left out")

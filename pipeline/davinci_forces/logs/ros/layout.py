@@ -13,15 +13,15 @@ from rosbags.interfaces import Nodetype
 from davinci_forces.logs.arrays import MAX_COLUMNS
 from davinci_forces.maths.arrays import Array
 
-HEADER = "std_msgs/msg/Header"
+HEADER_TYPE = "std_msgs/msg/Header"
 DIMENSIONS = "std_msgs/msg/MultiArrayLayout"  # of a list, which is read as it is
 JOINTS = "sensor_msgs/msg/JointState"
 JOINT_LISTS = ("name", "names", "joint_names", "joints")  # fields that name the joints of other fields
 PLACEHOLDER = "structure_needs_at_least_one_member"  # of an empty message, which ROS 1 does not write
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-TIME = np.dtype([("sec", "i4"), ("nanosec", "u4")])
+TIME_FIELDS = np.dtype([("sec", "i4"), ("nanosec", "u4")])
 ENCODINGS = (b"\0\0", b"\0\1")  # of CDR, big-endian and little-endian
-NUMBERS = {
+NUMBER_TYPES = {
     "int8": "i1", "byte": "i1", "uint8": "u1", "char": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
     "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8", "bool": "?",
 }  # fmt: skip
@@ -110,7 +110,7 @@ def layout_of(content: bytes, kind: str, types: Any, ros1: bool, first: Layout |
 
 def _holder(fields: Sequence[Any]) -> str:
     """The only field of a message besides a header and texts, if it is a message: its name says nothing more."""
-    held = [(name, node, of) for name, (node, of) in fields if of != HEADER and not (of and of[0] == "string")]
+    held = [(name, node, of) for name, (node, of) in fields if of != HEADER_TYPE and not (of and of[0] == "string")]
     return held[0][0] if len(held) == 1 and held[0][1] == Nodetype.NAME and held[0][2] not in TIMES else ""
 
 
@@ -147,14 +147,14 @@ class _Walk:
     def _field(self, path: str, node: Any, of: Any, unit: str, scope: str) -> None:
         if node == Nodetype.BASE:
             self._base(path, of[0], None, unit)
-        elif of in (HEADER, DIMENSIONS):
+        elif of in (HEADER_TYPE, DIMENSIONS):
             with self._left_out():
                 self.message(of, path, "")
                 if path == "header":
                     self.stamp = self.stamp or next((p for _, _, p in self.lists if p.dtype.names), None)
         elif node == Nodetype.NAME:
             if of in TIMES:
-                self._number(path, TIME, 4, None, "s")
+                self._number(path, TIME_FIELDS, 4, None, "s")
             else:
                 self.message(of, path, unit)
         else:
@@ -181,10 +181,10 @@ class _Walk:
     def _base(self, path: str, kind: str, length: int | None, unit: str) -> None:
         if kind == "string":
             self._text()
-        elif kind not in NUMBERS:
+        elif kind not in NUMBER_TYPES:
             raise Unlike(f"holds {path} of type {kind}, which is not supported")
         else:
-            dtype = np.dtype(NUMBERS[kind])
+            dtype = np.dtype(NUMBER_TYPES[kind])
             self._number(path, dtype, dtype.itemsize, length, unit)
 
     def _number(self, path: str, dtype: Any, alignment: int, length: int | None, unit: str) -> None:

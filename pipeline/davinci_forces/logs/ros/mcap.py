@@ -9,7 +9,7 @@ from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionF
 
 from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
 
-MAGIC = b"\x89MCAP0\r\n"
+MCAP_MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE_OF_MCAP, CHUNK_OF_MCAP, STATISTICS, DATA_END = 2, 3, 4, 5, 6, 11, 15
 MESSAGE_HEADER = struct.Struct("<HIQQ")
 CHUNK_HEADER = struct.Struct("<QQQI")
@@ -29,7 +29,7 @@ class Mcap(Scan):
 
     def scan(self, content: memoryview) -> None:
         """Go through the records of the file, and of its chunks."""
-        self.at = len(MAGIC)
+        self.at = len(MCAP_MAGIC)
         for kind, begin, end in _records(content, self.at):
             record = content[begin:end]
             if kind == CHUNK_OF_MCAP:
@@ -42,7 +42,7 @@ class Mcap(Scan):
             elif kind == FOOTER:
                 summary, _, crc = struct.unpack("<QQI", record)
                 _require_crc(crc, content[summary or begin - 9 : end - 4], "the summary")
-                if content[end:] != MAGIC:
+                if content[end:] != MCAP_MAGIC:
                     raise Damage("it does not end as MCAP ends")
                 return
             else:
@@ -51,7 +51,7 @@ class Mcap(Scan):
 
     def is_closed(self, content: memoryview) -> bool:
         """Whether the file ends as the recorder ends it."""
-        return len(content) > len(MAGIC) and content[-len(MAGIC) :] == MAGIC
+        return len(content) > len(MCAP_MAGIC) and content[-len(MCAP_MAGIC) :] == MCAP_MAGIC
 
     def compare(self) -> None:
         """Compare the messages with the statistics."""

@@ -13,7 +13,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
 
 MAGIC_1 = b"#ROSBAG V2.0\n"
-MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
+MESSAGE, BAG_RECORD, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
 # A message's header, with its fields in any order, and the length of its content.
 MESSAGE_HEAD = re.compile(
     rb"\x26\0\0\0(?:\x09\0\0\0conn=(.{4})|\x04\0\0\0op=\x02|\x0d\0\0\0time=(.{8})){3}(.{4})", re.DOTALL
@@ -40,7 +40,7 @@ class Rosbag1(Scan):
         self.at = len(MAGIC_1)
         for fields, begin, end in self._records(content, self.at):
             kind = fields[b"op"][0]
-            if kind == BAG:
+            if kind == BAG_RECORD:
                 self._begin(fields)
             elif kind == CHUNK:
                 self._scan_chunk(fields, content[begin:end], end <= len(content))

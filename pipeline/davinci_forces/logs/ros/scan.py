@@ -29,12 +29,12 @@ DECOMPRESSORS: dict[str, Any] = {
     "bz2": bz2.BZ2Decompressor, "lz4": lz4.frame.LZ4FrameDecompressor, "zstd": zstd.ZstdDecompressor,
 }  # fmt: skip
 UNPACKED = ("", "none")  # names of no compression
-UNREADABLE = (OSError, RuntimeError, ValueError, EOFError, zstd.ZstdError)  # raised by decompressors
+DECOMPRESSION_ERRORS = (OSError, RuntimeError, ValueError, EOFError, zstd.ZstdError)  # raised by decompressors
 MALFORMED = (struct.error, KeyError, IndexError, ValueError)  # raised by records that are no records
 CACHED_CHUNKS = 4
 BATCH_MESSAGES = 1 << 13  # messages that are read at a time
 BATCH_BYTES = 1 << 24  # and their size, whichever is reached first
-SIZES = 32  # messages of different sizes that stand for a topic
+MAX_SIZES = 32  # messages of different sizes that stand for a topic
 
 
 class Damage(Exception):
@@ -65,7 +65,7 @@ class Chunk:
             try:
                 decompressor = DECOMPRESSORS[self.compression]()
                 unpacked = memoryview(decompressor.decompress(self.content, max_length=self.size + 1))
-            except UNREADABLE as error:
+            except DECOMPRESSION_ERRORS as error:
                 raise Damage(f"a chunk cannot be decompressed ({error})") from None
         if self.whole and len(unpacked) != self.size:
             raise Damage(f"a chunk holds {len(unpacked)} bytes instead of {self.size}")
@@ -202,7 +202,7 @@ class Scan:
         """Time and content of the first message, and of one message of other sizes."""
         places = np.frombuffer(self.places[connection.id], np.int64).reshape(-1, 4)
         places = places[np.argsort(places[:, 0], kind="stable")]
-        first = np.sort(np.unique(places[:, 3] - places[:, 2], return_index=True)[1])[:SIZES]
+        first = np.sort(np.unique(places[:, 3] - places[:, 2], return_index=True)[1])[:MAX_SIZES]
         return [(time, bytes(self.content_of(chunk)[begin:end])) for time, chunk, begin, end in places[first].tolist()]
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.ros.mcap import Mcap
 from davinci_forces.logs.ros.rosbag1 import Rosbag1
-from davinci_forces.logs.ros.scan import BATCH_BYTES, BATCH_MESSAGES, SIZES, Batch, Integers, Table, decompress
+from davinci_forces.logs.ros.scan import BATCH_BYTES, BATCH_MESSAGES, MAX_SIZES, Batch, Integers, Table, decompress
 
 RULE = "=" * 80 + "\n"  # between definitions in IDL
 LITERAL = "/:"  # characters of a path that an SQLite address may hold unquoted
@@ -117,7 +117,7 @@ class Database:
 
     def samples(self, connection: Any) -> list[tuple[int, bytes]]:
         """Time and content of the first message, and of one message of other sizes."""
-        first = [number for _, number, *_ in sorted(self.sizes[connection.id])[:SIZES]]
+        first = [number for _, number, *_ in sorted(self.sizes[connection.id])[:MAX_SIZES]]
         query = "SELECT timestamp, data FROM messages WHERE id = ?"
         return [row for number in first for row in self.base.execute(query, [number])]
 

@@ -48,7 +48,7 @@ LIMIT_INSTANTS = 40  # for each harmonic; a peak between two of them is higher b
 # Penalties mu, with the share of the width of the friction's sign.  With the first, a limit is exceeded by a tenth.
 STAGES = ((30.0, 2.0), (120.0, 1.0), (480.0, 0.5), (2e3, 0.25), (8e3, 0.125), (3e4, 0.0625))
 EXPLORATION, SELECTION = 2, 3  # stages before the best trajectories are chosen
-ITERATIONS = 60  # of L-BFGS in each stage
+LBFGS_ITERATIONS = 60  # of L-BFGS in each stage
 STEP = 1e-6  # of the differences, relative to 1 rad or m: their error is 1e-10
 HUGE = 1e10  # of a motion without full rank
 
@@ -206,7 +206,7 @@ def _descend(
         def lagrangian(z: Array) -> tuple[float, Array]:
             return _lagrangian(stage, z, penalty, multipliers, stage.width(share))[:2]  # noqa: B023
 
-        z = minimize(lagrangian, z, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "maxcor": 30}).x
+        z = minimize(lagrangian, z, jac=True, method="L-BFGS-B", options={"maxiter": LBFGS_ITERATIONS, "maxcor": 30}).x
         multipliers = _lagrangian(stage, z, penalty, multipliers, stage.width(share))[2]
     return z, multipliers
 
