@@ -195,6 +195,19 @@ def test_a_hung_mass_is_found_within_its_interval():
     assert np.std(off) > 0.4  # nor are intervals so wide that nothing could miss them
 
 
+def test_friction_at_standstill_is_not_weighed():
+    models, motions = log("heavy", "weight", 300, HUNG.position)
+    held = (models[1].t > 5.0) & (models[1].t < 6.0)
+    free = log("fitted", "identification", 100), log("other", "validation", 200, path=0.8)
+    weights = []
+    for friction in (0.0, 3.0):
+        pitch = replace(models[1], tau=models[1].tau + friction * held, unscored=held.astype(int))
+        logs = [*free, ([models[0], pitch, models[2]], motions)]
+        weights.append(analysed(logs, Weighing("heavy", HUNG, ""))[0])
+    assert weights[1].mass == pytest.approx(weights[0].mass, abs=0.2 * weights[0].mass_std)
+    assert weights[1].mass_std < 1.2 * weights[0].mass_std
+
+
 # Joints that agree, and joints that do not
 
 

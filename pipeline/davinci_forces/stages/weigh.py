@@ -29,7 +29,6 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
-from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
@@ -125,12 +124,15 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
 
 
 def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
-    """Times (K,) at which the effort is measured and predicted, and the low-passed difference (K,)."""
+    """Times (K,) at which the effort is measured and predicted, and the low-passed difference (K,).
+
+    Standstill is left out, as friction can then take any value, and so are filled samples.
+    """
     predicted = np.isfinite(tau_hat)
     tau_ext = (model.tau - tau_hat)[predicted]
     if predicted.any():
         tau_ext = lowpass_segments(tau_ext, model.segment[predicted], model.rate, lowpass)
-    measured = model.unscored[predicted] != UNSCORED_SAMPLE
+    measured = model.unscored[predicted] == 0
     return model.t[predicted][measured], tau_ext[measured]
 
 
