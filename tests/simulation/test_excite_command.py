@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from davinci_forces.commands import excite
 from davinci_forces.errors import BadRequest, BadRobot
+from davinci_forces.simulation.excitation import request
 from tests.simulation.six_joints import write
 
 PITCH = "-0.1912,0.2861,-0.0639,0.1741,0.3701"
@@ -220,3 +221,28 @@ def test_a_joint_that_turns_without_limits_is_excited_within_one_turn(tmp_path):
 def test_noise_is_positive_and_one_or_one_for_each_joint(noise):
     with pytest.raises(BadRequest, match="--noise"):
         call("davinci", "hand_pitch", "--evaluate", PITCH, "--noise", noise)
+
+
+def test_a_stated_workspace_limits_the_search(monkeypatch):
+    def refuse(problem, *_):
+        raise ValueError(f"around it is {problem.limits.obstacles}")
+
+    monkeypatch.setattr(request, "design_together", refuse)
+    with pytest.raises(BadRequest, match=r"floor=-0\.2, boxes=\(\(0\.0, 1\.0, 2\.0, 3\.0, 4\.0, 5\.0\),\)"):
+        call("davinci", "all", "--floor", "-0.2", "--box", "0,1,2,3,4,5")
+    with pytest.raises(BadRequest, match=r"floor=-inf, boxes=\(\)"):
+        call("davinci", "all")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("all", "--box", "0,0,0,1,1"), "--box takes the lowest x,y,z and, all higher,"),
+        (("all", "--box", "1,0,0,0,1,1"), "all higher, the highest x,y,z, not '1,0,0,0,1,1'"),
+        (("all", "--floor", "nan"), "--floor must be a number"),
+        (("hand_pitch", "--floor", "0"), "--floor and --box take `all` joints"),
+    ],
+)
+def test_a_workspace_that_makes_no_sense_is_refused(words, says):
+    with pytest.raises(BadRequest, match=says):
+        call("davinci", *words)

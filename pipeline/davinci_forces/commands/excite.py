@@ -34,6 +34,12 @@ def run(
     noise: Annotated[
         str | None, typer.Option(help="Noise of the efforts (std): expect standard errors; one number, or one a joint.")
     ] = None,
+    floor: Annotated[
+        float | None, typer.Option(help="With `all`: no moving frame goes below this z [m], in base axes.")
+    ] = None,
+    box: Annotated[
+        list[str] | None, typer.Option(help="With `all`: no moving frame enters it: x,y,z,x,y,z [m]. May be repeated.")
+    ] = None,
     starts: Annotated[
         int | None, typer.Option(min=1, help="Starts of the search; default 24, or 2 if JOINT is `all`.")
     ] = None,
@@ -50,21 +56,24 @@ def run(
     """Minimise the criterion over Fourier series that keep the limits at every instant.
 
     All joints of an arm together keep their position, velocity and acceleration limits, the effort limits if the masses
-    are known, and the workspace if the robot states one. Efforts are those of weight and inertia, without friction. The
-    trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
+    are known, and the workspace of `--floor` and `--box`. Efforts are those of weight and inertia, without friction.
+    The trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
     find a better trajectory. An arm takes minutes; a line is printed after each start.
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 
-    request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples, noise)
+    limits, around = (q, dq, ddq), (floor, tuple(box or ()))
+    request = Request(
+        robot, joint, evaluate, period, harmonics, criterion, limits, starts, seed, samples, noise, around
+    )
     answered = answer(request, _progress())
-    limits = answered.arm.limits if answered.arm else None
+    of_arm = answered.arm.limits if answered.arm else None
     try:
         if csv:
             csv.write_text(
-                trajectory.table(answered.trajectories, rate, run_in, limits), encoding="utf-8", newline="\n"
+                trajectory.table(answered.trajectories, rate, run_in, of_arm), encoding="utf-8", newline="\n"
             )
         if plot:
             trajectory.plot(answered.trajectories, plot)

@@ -19,7 +19,7 @@ from davinci_forces.maths.excitation.arm import (
 )
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
 from davinci_forces.maths.excitation.joint import ExcitationProblem
-from davinci_forces.maths.excitation.limits import ArmLimits, Obstacles
+from davinci_forces.maths.excitation.limits import ArmLimits, Box, Obstacles
 from davinci_forces.maths.excitation.search import ReportStart, ignore_start
 from davinci_forces.maths.models.coupled import LINK_UNITS
 from davinci_forces.maths.models.terms import TERMS
@@ -53,6 +53,7 @@ class Request:
     seed: int
     samples: int  # K, samples of a period in the criterion
     noise: str | None = None  # standard deviation of the effort's noise: of every joint, or one for each
+    around: tuple[float | None, tuple[str, ...]] = (None, ())  # z of a floor [m], and boxes: "x,y,z,x,y,z"
 
 
 class ArmExcitation(NamedTuple):
@@ -96,13 +97,14 @@ def answer(request: Request, report_start: ReportStart = ignore_start) -> Answer
         raise BadRequest(f"{problem}, not {request.period:g}")
     if all_joints and request.evaluate:
         raise BadRequest("--evaluate takes one joint; name it instead of `all`")
+    if _obstacles(request).present and (not all_joints or robot.chain is None):
+        raise BadRequest("--floor and --box take `all` joints of a robot whose links are known")
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
     problems = [_problem(request, joint, period) for joint in joints]
     noise = _noise(request.noise, len(joints))
     if all_joints and robot.chain is not None:
         efforts = [joint.limits.effort for joint in joints]
-        obstacles = Obstacles()  # no robot states any
-        arm = arm_problem(robot.chain, problems, robot.bodies, efforts, obstacles)
+        arm = arm_problem(robot.chain, problems, robot.bodies, efforts, _obstacles(request))
         return _of_arm(request, robot, arm, noise, report_start)
     return Answer([_excitation(request, *part) for part in zip(joints, problems, noise, strict=True)])
 
@@ -165,6 +167,19 @@ def _noise(text: str | None, n: int) -> list[float]:
     if len(values) not in (1, n) or (text and min(values) <= 0):
         raise BadRequest(f"--noise takes one positive number, or {n} for the joints in their order, not {text!r}")
     return values * n if len(values) == 1 else values
+
+
+def _obstacles(request: Request) -> Obstacles:
+    floor, texts = request.around
+    boxes: list[Box] = []
+    for text in texts:
+        box = _numbers("--box", text)
+        if len(box) != 6 or any(low >= high for low, high in zip(box[:3], box[3:], strict=True)):
+            raise BadRequest(f"--box takes the lowest x,y,z and, all higher, the highest x,y,z, not {text!r}")
+        boxes.append((box[0], box[1], box[2], box[3], box[4], box[5]))
+    if floor is not None and not math.isfinite(floor):
+        raise BadRequest(f"--floor must be a number [m], not {floor:g}")
+    return Obstacles(-math.inf if floor is None else floor, tuple(boxes))
 
 
 def _limits(option: str, text: str) -> Range:
