@@ -151,7 +151,9 @@ def _by_motion(
         elif holding.repeats:
             roles[i] = Role("validation", f"its motion stays within that of {within}, which identifies")
         else:
-            roles[i] = Role("validation", f"its motion does not repeat, but that of {within} does")
+            roles[i] = Role(
+                "validation", "its motion does not repeat" + (f", but that of {within} does" if within else "")
+            )
     return roles | _not_repeating(recordings, late, reach, any(tested))
 
 

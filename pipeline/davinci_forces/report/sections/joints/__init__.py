@@ -48,13 +48,10 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """Explain the columns of the tables."""
     return Prose(
-        "The parameters of each joint are fitted to the averaged periods of all its identification logs. The standard "
-        "error after each value has two parts. That of noise follows from the differences between periods, or from the "
-        "residuals of a log without periods. That of the model is the change of the parameter if blocks of path are "
-        "left out, or if friction is added to the model that predicts as well. No motion separates friction that "
-        "differs by direction from the weight of a vertical slide, so the model's part of that weight is large. "
-        "$z$ is the value over its standard error. A parameter with $abs(z) < 2$ may be zero in a better model. One "
-        "that is called not significant is within two standard errors of noise of zero, so the data do not show it."
+        "The parameters of each joint are fitted to the averaged periods of its identification logs. The standard "
+        "error of a value has two parts: of noise, by the differences between periods, and of the model, by the change "
+        "without blocks of path, or with other friction. $z$ is the value over its standard error. A parameter with "
+        "$abs(z) < 2$ may be zero in a better model; one within two errors of noise of zero is called not significant."
     )
 
 
