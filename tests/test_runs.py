@@ -360,8 +360,9 @@ def test_floats_are_stored_byte_by_byte_and_compressed(analysed):
     for i in range(group.num_columns):
         column = group.column(i)
         assert column.compression == "LZ4"
-        assert "BYTE_STREAM_SPLIT" in column.encodings
-        assert not column.has_dictionary_page
+        if column.physical_type == "DOUBLE":
+            assert "BYTE_STREAM_SPLIT" in column.encodings
+            assert not column.has_dictionary_page
 
 
 def test_no_processed_file_knows_this_machine(analysed):

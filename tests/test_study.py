@@ -93,7 +93,7 @@ def test_a_good_study_means_what_it_says(tmp_path):
         (
             'unit = "deg"',
             'unit = "degres"',
-            "11: log 'a': channel of 'hand_roll.theta_m': unknown unit 'degres'; known units are rad, deg",
+            "11: log 'a': channel of 'hand_roll.theta_m': unknown unit 'degres'; known units are rad, mrad, deg",
         ),
         (
             'unit = "deg"',
