@@ -3,6 +3,7 @@
 import contextlib
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -216,6 +217,33 @@ def test_a_study_may_say_how_long_its_tool_was(tmp_path):
     assert made.changed == {"tool": {"length": 0.5}}
 
 
+def test_a_study_may_say_how_its_base_is_mounted(tmp_path):
+    """On a wall gravity pulls along the base's -y, and what the thesis prints of the upright arm does not apply."""
+    made = read(tmp_path, GOOD.replace('"davinci"', '"davinci"\nbase = { rpy = [1.5707963267948966, 0.0, 0.0] }'))
+    np.testing.assert_allclose(made.robot.chain.up, [0.0, 1.0, 0.0], rtol=0, atol=1e-15)
+    roll, _, slide = made.robot.joints
+    assert {"gravity, sine", "gravity, cosine"}.isdisjoint(term.name for term in roll.terms)  # it lies along gravity
+    assert [term.name for term in slide.terms] == ["inertia", "offset", "viscous friction", "Coulomb friction"]
+    assert roll.printed is None
+    assert made.changed == {"base": {"rpy": [1.5707963267948966, 0.0, 0.0]}}
+    upright = read(tmp_path, GOOD.replace('"davinci"', '"davinci"\nbase = { rpy = [0.0, 0.0, 2.0] }'))
+    assert upright.robot.joints == robots.load("davinci", tmp_path).joints
+
+
+@pytest.mark.parametrize(
+    ("base", "says"),
+    [
+        ("{ rpy = [90.0, 0.0, 0.0] }", "base: rpy is in rad, so that [90.0, 0.0, 0.0] is more than a turn"),
+        ("{ rpy = [0.0, 0.0] }", "base: rpy must be roll, pitch and yaw [rad]"),
+        ("{ roll = 1.0 }", "base: rpy is missing"),
+    ],
+)
+def test_what_is_wrong_with_a_base_is_said(tmp_path, base, says):
+    with pytest.raises(BadStudy) as caught:
+        read(tmp_path, GOOD.replace('"davinci"', f'"davinci"\nbase = {base}'))
+    assert says in str(caught.value)
+
+
 @pytest.mark.parametrize("file", ["..x.csv", "...csv", "a/../b.csv"])
 def test_a_file_whose_name_begins_with_dots_lies_inside(tmp_path, file):
     (tmp_path / "study.toml").write_text(GOOD.replace("a.csv", file))
@@ -283,8 +311,8 @@ def test_nothing_that_is_wrong_hides_anything_else(tmp_path):
     text = GOOD.replace("title", "titel").replace("period = 10", "period = -10").replace("hand_roll.i", "hand_rol.i")
     (tmp_path / "study.toml").write_text(text)
     known = (
-        "known keys are title, robot, simulated, robot_overrides, tool, settings, haptics, baseline, log; did you mean "
-        "'title'?"
+        "known keys are title, robot, simulated, robot_overrides, tool, base, settings, haptics, baseline, log; did "
+        "you mean 'title'?"
     )
     assert problems(tmp_path) == [
         f"study.toml:1: unknown key 'titel'; {known}",

@@ -287,6 +287,50 @@ def test_what_is_wrong_with_a_file_is_said_with_its_element_its_line_and_a_remed
     assert says in "\n".join(problems)
 
 
+def test_a_base_turned_in_the_study_is_a_base_turned_in_the_file():
+    """Efforts are those of the same arm on a joint that turns it, up to the axes of the base."""
+    rpy = (0.7, -0.4, 1.1)
+    on_slope = JOINT.format(
+        name="s", kind="fixed", on="world", link="base", at="0 0 0", rpy="0.7 -0.4 1.1", axis="0 0 1", more=""
+    )
+    turned = robot(GRIPPER.replace('<link name="base"/>', f'<link name="world"/><link name="base"/>{on_slope}'))
+    stated = robot(GRIPPER).with_base(rpy)
+    same_dynamics(turned, stated, 3, 1e-12)
+    upright, (q, dq, ddq) = robot(GRIPPER), motions(3)
+    assert abs(upright_effort(upright, q) - upright_effort(stated, q)).max() > 1.0
+    many = np.tile(q[:10], (2001, 1)), np.tile(dq[:10], (2001, 1)), np.tile(ddq[:10], (2001, 1))  # compiled
+    few = rigid_body.inverse_dynamics(stated.chain, stated.bodies, q[:10], dq[:10], ddq[:10])
+    assert_allclose(rigid_body.inverse_dynamics(stated.chain, stated.bodies, *many)[:10], few, rtol=0, atol=1e-12)
+    R = transform((0, 0, 0), rpy)[:3, :3]
+    assert_allclose(kinematics.tip(turned.chain, q), kinematics.tip(stated.chain, q) @ R.T, rtol=0, atol=1e-12)
+
+
+def upright_effort(arm, q):
+    return rigid_body.gravity(arm.chain, arm.bodies, q)
+
+
+def test_a_joint_has_the_gravity_terms_that_its_base_gives_it():
+    """A gantry of a slide and a turn about the vertical has no gravity upright, and all of it on a wall."""
+    arm = f"""<robot name="gantry"><link name="base"/>{LINK.format(name="a", mass=2.0, centre="0.1 0 0.2")}
+    {LINK.format(name="b", mass=1.0, centre="0.1 0 0.2")}
+    {JOINT.format(name="slide", kind="prismatic", on="base", link="a", at="0 0 0", rpy="0 0 0", axis="1 0 0", more="")}
+    {JOINT.format(name="turn", kind="continuous", on="a", link="b", at="0 0 0", rpy="0 0 0", axis="0 0 1", more="")}
+    </robot>"""
+    upright, wall = robot(arm), robot(arm).with_base((0.0, np.pi / 2, 0.0))
+    names = [[term.name for term in joint.terms] for joint in (*upright.joints, *wall.joints)]
+    assert not any("gravity" in name for name in names[0] + names[1])
+    assert "offset" in names[2]
+    assert {"gravity, sine", "gravity, cosine"} <= set(names[3])
+
+
+def test_limits_of_nothing_but_zeros_and_noise_for_an_inertia_are_none():
+    """As several public descriptions have them: `lower="0" upper="0"`, and products of 1e-35 with no moments."""
+    zeros = robot(GRIPPER.replace('lower="-2" upper="2" velocity="3" effort="40"', 'lower="0" upper="0"', 1))
+    assert zeros.joints[0].limits.q == (-np.inf, np.inf)
+    noise = GRIPPER.replace('ixx="0.03" ixy="0.001" ixz="-0.002" iyy="0.02" iyz="0.003" izz="0.025"', 'ixz="2e-35"', 1)
+    assert robot(noise).bodies is not None
+
+
 @pytest.mark.parametrize("axis", ["0 0 0", "0 0", "nan 0 0", "1e400 0 0"])
 def test_the_axis_of_a_fixed_joint_is_ignored_whatever_it_says(axis):
     start = GRIPPER.index('<joint name="a"')

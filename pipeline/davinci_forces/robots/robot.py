@@ -9,8 +9,10 @@ from typing import NamedTuple
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.placed import transform
+from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
 from davinci_forces.maths.models.physical import PhysicalTable
-from davinci_forces.maths.models.terms import Term
+from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia, lifted_mass, offset
 
 ANYWHERE = (-math.inf, math.inf)
 MOST_JOINTS = 200  # moving joints; the time grows with their square, to minutes; a humanoid with two hands has 80
@@ -92,6 +94,12 @@ class Joint:
         """Fill in the joint's units."""
         return self.kind.unit(template, self.effort)
 
+    def terms_under_gravity(self, loaded: bool) -> tuple[Term, ...]:
+        """The terms of its model if gravity loads the joint, or does not; a prismatic joint feels a constant force."""
+        weight = (gravity_sin, gravity_cos) if self.kind is Kind.REVOLUTE else (offset,)
+        kept = [term for term in self.terms if term not in (inertia, lifted_mass, gravity_sin, gravity_cos, *weight)]
+        return (inertia, *(weight if loaded else ()), *kept)
+
 
 @dataclass(frozen=True)
 class ControlStudy:
@@ -149,6 +157,27 @@ class Robot:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
         chain = self.chain.lengthen(self.tool.link, length - self.tool.length)
         return replace(self, chain=chain, tool=replace(self.tool, length=length))
+
+    def with_base(self, rpy: tuple[float, float, float]) -> "Robot":
+        """The robot on a base with this roll, pitch and yaw [rad] in a world whose z axis points up.
+
+        Positions, forces and the tip stay in base axes.  Each joint's model gets the gravity terms of this base, and
+        loses its published parameters, which are of an upright base.
+
+        Raises
+        ------
+        BadRobot
+            If the robot has no chain, which tells how gravity loads its joints.
+        """
+        if self.chain is None:
+            raise BadRobot(f"robot {self.name} has no chain, so gravity on another base is not known; leave base out")
+        x, y, z = transform((0.0, 0.0, 0.0), rpy)[2, :3].tolist()  # the world's z in base axes
+        chain = replace(self.chain, up=(x, y, z))
+        if math.isclose(z, 1.0, rel_tol=0, abs_tol=1e-12):
+            return self
+        joints = zip(self.joints, loaded_by_gravity(chain)[: len(self.joints)], strict=True)
+        turned = (replace(j, terms=j.terms_under_gravity(loaded), physical=None, printed=None) for j, loaded in joints)
+        return replace(self, chain=chain, joints=tuple(turned))
 
     @property
     def coordinates(self) -> tuple[str, ...]:

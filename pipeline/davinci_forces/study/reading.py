@@ -18,7 +18,7 @@ from davinci_forces.study import HapticScenario, LogEntry, Settings, Study
 from davinci_forces.study.entries import check_positive, entries_of, is_inside, lines_of_files
 from davinci_forces.study.guessing import clock_hint
 from davinci_forces.study.timing import has_clock
-from davinci_forces.toml import TomlTable
+from davinci_forces.toml import TomlTable, excerpt
 
 # Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
 VARIANT_FITS = tuple(
@@ -51,6 +51,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     overrides = table.table("robot_overrides")
     robot = _overridden(robot, overrides) if robot else None
     robot = _with_tool(robot, table) if "tool" in table else robot
+    robot = _with_base(robot, table) if "base" in table else robot
     remarks = _remarks(table.table("settings"))
     settings = _settings(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
@@ -67,7 +68,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     assert robot is not None
     robot_file = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
-    changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
+    changed = overrides.values | {name: table.values[name] for name in ("tool", "base") if name in table}
     return Study(
         folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, robot_file, lines, remarks
     )
@@ -151,6 +152,20 @@ def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
         return robot.with_tool(length) if robot and math.isfinite(length) else robot
     except BadRobot as error:
         table.problem(str(error), "tool")
+        return robot
+
+
+def _with_base(robot: Robot | None, table: TomlTable) -> Robot | None:
+    """The robot on the base that the study states; overridden terms are those of the base, too."""
+    base = table.table("base")
+    rpy = base.numbers("rpy", count=3, expected="roll, pitch and yaw [rad], such as [1.5708, 0.0, 0.0]")
+    if rpy and max(map(abs, rpy)) > 2 * math.pi:
+        base.problem(f"rpy is in rad, so that {excerpt(list(rpy))} is more than a turn; write degrees as rad", "rpy")
+    base.close()
+    try:
+        return robot.with_base((rpy[0], rpy[1], rpy[2])) if robot and rpy else robot
+    except BadRobot as error:
+        table.problem(str(error), "base")
         return robot
 
 

@@ -3,6 +3,7 @@
 Every link has a frame at its joint, with z along the joint axis.  The pose of a link relative to its parent is its
 placement times Rz(q) or Tz(q).  One coordinate may move several links, as in a parallelogram.  A link may have several
 children, such as two jaws.  Named frames are fixed to links.  The base is body 0, and link i is body i + 1.
+Gravity acts against `up`: the z axis of the base unless the base is mounted on a wall, a ceiling or a slope.
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 4.
 
 A chain is built from placements (`placed`) or from a table of Denavit-Hartenberg parameters.  With the inertial
@@ -21,6 +22,7 @@ from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_ine
 
 FIXED = -1  # the coordinate of links that do not move
 BASE = "0"
+Z_AXIS = (0.0, 0.0, 1.0)
 
 
 class TableRow(NamedTuple):
@@ -53,6 +55,7 @@ class Chain:
     tip: str  # name of the frame whose origin is the tip
     n: int  # coordinates
     table: tuple[TableRow, ...] = ()  # rows of all frames after the base, if the chain was built from a table
+    up: tuple[float, float, float] = Z_AXIS  # direction against gravity, of length 1, in base axes
 
     def with_coordinates(self, n: int) -> "Chain":
         """The same arm with only its first n coordinates; all later ones are fixed at 0.
@@ -159,6 +162,7 @@ class Tree(NamedTuple):
     moves: Any  # (L, n) whether a coordinate moves the link, itself or through an ancestor
     carried: Any  # (L,) mass of the link and all its descendants [kg]
     rows: Any  # (L, 22) rotation and position in the parent's frame at q = 0, and inertial parameters
+    up: Any  # (3,) direction against gravity in base axes
 
     def lists(self) -> "Tree":
         """The same tree, with lists in place of arrays."""
@@ -177,7 +181,8 @@ def tree_of(chain: Chain, parameters: Array) -> Tree:
     still = chain.coordinate == FIXED
     rows = np.column_stack([T[:, :3, :3].reshape(-1, 9), T[:, :3, 3], parameters])
     coordinate = np.where(still, chain.n, chain.coordinate)
-    return Tree(chain.n, chain.parent, coordinate, chain.slides | still, moves[1:], carried[1:], rows)
+    slides = chain.slides | still
+    return Tree(chain.n, chain.parent, coordinate, slides, moves[1:], carried[1:], rows, np.array(chain.up))
 
 
 def fold_fixed_links(chain: Chain, parameters: Array) -> tuple[Chain, Array]:

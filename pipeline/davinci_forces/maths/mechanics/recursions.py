@@ -46,7 +46,8 @@ def add_effort(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
 
 def motions(tree: Tree, gravity: float, joints: Any, scratch: Any, samples: Samples) -> None:
     """Store the motion (w, dw, a) of every link in the first 9 numbers of its body."""
-    fill(scratch[0, 8], gravity, samples)  # gravity acts like an upward acceleration g of the base
+    for k in range(3):
+        fill(scratch[0, 6 + k], gravity * tree.up[k], samples)  # gravity acts like an upward acceleration g of the base
     for i in range(len(tree.parent)):
         constants, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
         parent, body = scratch[tree.parent[i]], scratch[i + 1]

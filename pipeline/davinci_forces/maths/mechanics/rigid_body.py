@@ -16,6 +16,9 @@ from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
 
 ALL = (slice(None),)  # index of all samples, for numpy
+RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
+# [m, or N/kg] Products of lengths of metres have rounding errors of 1e-15; files state angles to eleven digits.
+MIN_GRAVITY_ENTRY = 1e-6
 COMPILE_FROM = 20_000  # samples; numpy computes fewer before the kernels are loaded
 
 
@@ -79,6 +82,13 @@ def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     tree = tree_of(chain.with_coordinates(n), np.zeros((L, 10)))
     regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, L, 10))
     return Y
+
+
+def loaded_by_gravity(chain: Chain) -> list[bool]:
+    """Whether gravity loads each coordinate in any pose; a vertical axis of rotation is never loaded."""
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_POSES, chain.n))
+    Y = regressor(chain, q, np.zeros_like(q), np.zeros_like(q))
+    return [bool(x) for x in abs(Y).max(axis=(0, 2)) > MIN_GRAVITY_ENTRY]
 
 
 def moving_tree(chain: Chain, bodies: Bodies, n: int) -> Tree:

@@ -15,9 +15,9 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
-from davinci_forces.maths.mechanics.chain import FIXED, Chain
+from davinci_forces.maths.mechanics.chain import FIXED
 from davinci_forces.maths.mechanics.placed import PlacedLink, assemble_chain
-from davinci_forces.maths.mechanics.rigid_body import regressor
+from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
 from davinci_forces.robots.urdf import tables
@@ -26,7 +26,6 @@ from davinci_forces.toml.file import TomlFile
 
 DEFAULT_HARMONICS = 10  # of an unknown excitation: more than most excitations have, and too few to fit noise
 TIPS = (TIP, "tcp", "tool0", "ee_link")  # customary names of the frame at the tip
-RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
 FRICTION = (viscous, coulomb, offset)
 
 
@@ -70,10 +69,9 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     chain, bodies = assemble_chain(root, _placed(root, ordered, moved, list(coordinates), weights), _tip(root, ordered))
     known_bodies = bodies if any(weight is not None for weight in weights.values()) else None
     name = outermost.attributes.get("name", "") or stem
-    moved_by_gravity = _moved_by_gravity(chain)
     robot_joints = tuple(
         _joint(by_name[joint], called, moves)
-        for (joint, called), moves in zip(coordinates.items(), moved_by_gravity, strict=True)
+        for (joint, called), moves in zip(coordinates.items(), loaded_by_gravity(chain), strict=True)
     )
     return Robot(name, name, robot_joints, chain, known_bodies)
 
@@ -178,14 +176,6 @@ def _tip(root: str, ordered: Sequence[UrdfJoint]) -> str:
     outermost = [link for link in depth if depth[link] == max(depth.values())]
     ends = [link for link in outermost if link not in {joint.parent for joint in ordered}]
     return next((name for name in TIPS if name in depth), (ends or outermost)[0])
-
-
-def _moved_by_gravity(chain: Chain) -> list[bool]:
-    """Whether gravity loads each coordinate in any pose; a vertical axis of rotation is never loaded."""
-    q = np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_POSES, chain.n))
-    Y = regressor(chain, q, np.zeros_like(q), np.zeros_like(q))
-    # Products of lengths of metres have rounding errors of 1e-15; files state angles to eleven digits.
-    return [bool(x) for x in abs(Y).max(axis=(0, 2)) > 1e-6]
 
 
 def _joint(joint: UrdfJoint, name: str, has_gravity: bool) -> Joint:

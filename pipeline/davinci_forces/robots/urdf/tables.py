@@ -33,6 +33,7 @@ MOST_ATTRIBUTES = 30
 NAME = re.compile(r"[\w ./:+-]{1,100}")  # links and joints; valid in files, equations and messages
 MOVING = ("revolute", "continuous", "prismatic")
 NO_LIMIT = 1e9  # [N m, N or SI units of motion] larger values mean no limit, which URDF cannot express
+NEGLIGIBLE_INERTIA = 1e-7  # [kg m^2] several times that of 1 cm^3 of water; programs write such noise for "none"
 ROUNDING = 1e-9  # share of an inertia's largest eigenvalue: rounded digits may make an eigenvalue this negative
 TIP = "tip"  # name of the frame at the tip in files that we write
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -202,7 +203,7 @@ def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
     tensor = stated.child("inertia")
     xx, xy, xz, yy, yz, zz = (notes.number(tensor, key, 0.0) for key in TENSOR)
     values = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if values[0] < -ROUNDING * abs(values).max():
+    if values[0] < -max(ROUNDING * abs(values).max(), NEGLIGIBLE_INERTIA):
         wrong = f"the smallest principal moment of inertia is {values[0]:.3g} kg m^2, but must be 0 or more"
         notes.problem(f"{wrong}; correct its signs, or leave the inertial out", tensor)
     about_centre = np.array([[0.0, 0.0, 0.0, 0.0, xx, xy, xz, yy, yz, zz]])
@@ -241,11 +242,10 @@ def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
 
 
 def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, float]:
-    """The range of a joint's position; infinite if the joint is continuous or states neither bound."""
-    stated = limit is not None and {"lower", "upper"} & limit.attributes.keys()
-    if kind not in ("revolute", "prismatic") or not stated:
-        return -math.inf, math.inf
+    """The range of a joint's position; infinite if the joint is continuous or states no bound but 0 for both."""
     low, high = (notes.number(limit, key, 0.0) for key in ("lower", "upper"))
+    if kind not in ("revolute", "prismatic") or low == high == 0.0:
+        return -math.inf, math.inf
     if low >= high:
         wrong = f"lower is {low:g} and upper is {high:g}, but lower must be less than upper"
         notes.problem(f'{wrong}; correct them, or write type="fixed" if the joint does not move', limit)
