@@ -94,6 +94,38 @@ def test_rows_name_what_changed_came_and_went(tmp_path):
     assert "+4.0" in said
 
 
+def test_the_ten_largest_changes_of_each_joint_come_first_and_the_rest_is_counted(tmp_path):
+    """In standard errors, by what they are about; a number without an error ranks behind those with one."""
+    keys = [f"fit.roll.lse.p{i}" for i in range(12)] + ["contact.a.roll.1.peak", "noise.a.roll.sigma", "fit.slide.m"]
+    before = dict.fromkeys(keys, (1.0, 0.1)) | {"tip.a.rms": 1.0, "ekf-euler.a.roll.level": 1.0}
+    after = {key: (2.0 + i, 0.1) for i, key in enumerate(keys)} | {"tip.a.rms": 3.0, "ekf-euler.a.roll.level": 9.0}
+    a, b = results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after)
+    roll, slide, other = call("compare", a, b).split("\n\n")[1:4]
+    listed = [line.split() for line in roll.splitlines()[2:-1]]
+    assert [row[:2] for row in listed[:8]] == [["model", f"fit.roll.lse.p{i}"] for i in range(11, 3, -1)]
+    assert [row[0] for row in listed[8:]] == ["contacts", "noise"]
+    assert roll.splitlines()[-1] == "  and 4 of model, 1 of forces: --all lists them"
+    assert "slide: 1 changed" in slide
+    assert "not of one joint: 1 changed" in other
+    said = call("compare", a, b, "--all")
+    assert all(key in said for key in (*before, "tip.a.rms"))
+    assert "--all" not in said
+
+
+def test_two_robots_are_told_apart(tmp_path):
+    folders = [tmp_path / robot for robot in ("davinci", "ur10e")]
+    for i, folder in enumerate(folders):
+        folder.mkdir()
+        (folder / "summary.json").write_text(json.dumps({"robot": folder.name}))
+        results(folder / "results.json", x=float(i))
+    pair = [folder / "results.json" for folder in folders]
+    said = call("compare", *pair)
+    assert "1 numbers of robot ur10e" in said
+    assert "these are different robots" in said
+    assert "changed" not in said
+    assert "1 of the 1 shared numbers changed" in call("compare", *pair, "--all")
+
+
 def test_a_change_in_a_late_digit_is_shown_in_as_many(tmp_path):
     a, b = results(tmp_path / "a.json", x=1.0), results(tmp_path / "b.json", x=1.0 + 1e-8)
     assert "1.00000001 N" in call("compare", a, b)

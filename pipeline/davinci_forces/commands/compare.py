@@ -5,6 +5,8 @@ changed if the relative difference exceeds 1e-9. A number with another unit has 
 """
 
 import json
+import sys
+from collections import Counter
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,14 +18,18 @@ from davinci_forces.runner.console import echo
 if TYPE_CHECKING:
     from davinci_forces.report.changes import Change, StatedValue
 
+LARGEST = 10  # changes of a joint that are listed
+ORDER = ("model", "contacts", "forces", "noise", "study")  # of what changes are about
+
 
 def run(
     a: Annotated[Path, typer.Argument(help="A results.json, or a study, raw/<study>, that has one.")],
     b: Annotated[Path, typer.Argument(help="The results.json or study to compare with it.")],
     reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="List every change, not the ten largest of each joint.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows of key, a, b, std and z as JSON.")] = False,
 ) -> None:
-    """Print every number of B that differs from that of A, and the keys that only one of them has."""
+    """List what changed from A to B, joint by joint, the largest changes in standard errors first."""
     from davinci_forces.report.changes import changes
     from davinci_forces.runner import runs
     from davinci_forces.runner.results import stated
@@ -34,9 +40,13 @@ def run(
     if as_json:
         echo(json.dumps([_row(change) for change in differing], indent=1, ensure_ascii=False, allow_nan=False))
         return
-    for name, file, numbers in zip("ab", files, (before, after), strict=True):
-        echo(f"{name}: {file}, {len(numbers)} numbers")
-    echo("\n".join(_lines(differing, before, after)))
+    arms = [stated.robot_of(file) for file in files]
+    for name, file, numbers, arm in zip("ab", files, (before, after), arms, strict=True):
+        echo(f"{name}: {file}, {len(numbers)} numbers{f' of robot {arm}' if arm else ''}")
+    if all(arms) and arms[0] != arms[1] and not every:
+        echo("these are different robots, so their numbers are not compared; --all compares those with the same key")
+        return
+    echo("\n".join(_lines(differing, before, after, sys.maxsize if every else LARGEST)))
 
 
 def _row(change: "Change") -> dict[str, Any]:
@@ -49,29 +59,40 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not isfinite(value) else value
 
 
-def _lines(differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"]) -> list[str]:
-    """The comparison as lines of text."""
+def _lines(
+    differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"], most: int
+) -> list[str]:
+    """The comparison as lines of text, with at most `most` changes of a joint."""
+    from davinci_forces.report.changes import by_joint
+
     changed = [change for change in differing if change.before and change.after]
     shared = [key for key in before if key in after]
     lines = [f"{len(changed)} of the {len(shared)} shared numbers changed"]
+    for joint, group in by_joint(changed, [*before, *after]).items():
+        largest = sorted(group[:most], key=lambda change: ORDER.index(change.subject))
+        lines += ["", f"{joint or 'not of one joint'}: {len(group)} changed"]
+        lines += _table([("", "key", "a", "b", "std", "z"), *map(_cells, largest)])
+        rest = Counter(change.subject for change in group[most:])
+        lines += [f"  and {', '.join(f'{rest[m]} of {m}' for m in ORDER if rest[m])}: --all lists them"] if rest else []
     if changed:
-        lines += _table([("key", "a", "b", "std", "z"), *map(_cells, changed)])
         with_error = sum(before[key].std is not None or after[key].std is not None for key in shared)
         lines += [
+            "",
             f"between independent recordings, about {0.05 * with_error:.0f} of the {with_error} numbers with a "
-            "standard error would change by chance"
+            "standard error would change by chance",
         ]
     removed, added = [c.key for c in differing if not c.after], [c.key for c in differing if not c.before]
     for verb, keys in (("removed", removed), ("added", added)):
-        lines += [f"{len(keys)} {verb}:", *(f"  {key}" for key in keys)] if keys else []
+        more = [f"  and {len(keys) - most} more: --all lists them"] if len(keys) > most else []
+        lines += [f"{len(keys)} {verb}:", *(f"  {key}" for key in keys[:most]), *more] if keys else []
     return lines
 
 
 def _cells(change: "Change") -> tuple[str, ...]:
     assert change.before
     assert change.after
-    return (change.key, *_pair(change.before, change.after), "" if change.std is None else f"{change.std:.2g}",
-            "" if change.z is None else f"{change.z:+.1f}")  # fmt: skip
+    std, z = (None if x is None else format(x, spec) for x, spec in ((change.std, ".2g"), (change.z, "+.1f")))
+    return (change.subject, change.key, *_pair(change.before, change.after), std or "", z or "")
 
 
 def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
@@ -86,10 +107,12 @@ def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
 
 
 def _table(rows: list[tuple[str, ...]]) -> list[str]:
-    """Rows of a table, the first column aligned left and the others right."""
+    """Rows of a table, the first two columns aligned left and the others right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  "
-        + "  ".join(c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))).rstrip()
+        + "  ".join(
+            c.rjust(w) if i > 1 else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
         for row in rows
     ]

@@ -1,9 +1,27 @@
 """Which numbers of two results.json differ by more than their standard errors allow."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+SUBJECTS = {  # what a key is about, by its first part; other keys are of the study
+    "model": ("fit", "choice", "cv", "predict", "path", "search", "guess", "identifiability", "correlation", "truth"),
+    "contacts": ("contact", "tissue", "weight"),
+    "forces": (
+        "effort",
+        "tip",
+        "ekf",
+        "threshold",
+        "tuning",
+        "direct",
+        "momentum",
+        "rate",
+        "rts",
+        "stability",
+        "haptics",
+    ),
+    "noise": ("noise", "whiteness", "band", "period", "log"),
+}
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
 
@@ -46,12 +64,38 @@ class Change:
         a, b = self.before.number, self.after.number
         return (b - a) / self.std if a is not None and b is not None and math.isfinite(b - a) else None
 
+    @property
+    def subject(self) -> str:
+        """What the number is about: a key of SUBJECTS, or "study"."""
+        start = self.key.split(".")[0].partition("-")[0]  # ekf-euler is an ekf
+        return next((subject for subject, starts in SUBJECTS.items() if start in starts), "study")
+
+    @property
+    def size(self) -> tuple[bool, float]:
+        """A size to sort by: standard errors first, then relative differences, then other changes."""
+        a, b = (number.number if number else None for number in (self.before, self.after))
+        if self.z is not None:
+            return True, abs(self.z)
+        if a is None or b is None or not math.isfinite(b - a):
+            return False, math.inf
+        return False, abs(b - a) / max(abs(a), abs(b), math.ulp(0.0))
+
 
 def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue]) -> list[Change]:
     """Every key that changed, went or came, in the order of the files."""
     both = [Change(key, a, after.get(key)) for key, a in before.items()]
     came = [Change(key, None, b) for key, b in after.items() if key not in before]
     return [d for d in (*both, *came) if d.before is None or d.after is None or has_changed(d.before, d.after)]
+
+
+def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:
+    """Changes by the joint that their keys name, "" for none, the largest first; `keys` are all keys of a study."""
+    joints = {key.split(".")[1]: None for key in keys if key.startswith(("fit.", "threshold."))}
+    groups: dict[str, list[Change]] = {}
+    for change in sorted(differing, key=lambda change: change.size, reverse=True):
+        joint = next((part for part in change.key.split(".")[1:] if part in joints), "")
+        groups.setdefault(joint, []).append(change)
+    return {joint: groups[joint] for joint in (*joints, "") if joint in groups}
 
 
 def has_changed(a: StatedValue, b: StatedValue) -> bool:

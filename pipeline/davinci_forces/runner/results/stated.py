@@ -39,6 +39,14 @@ def read(file: Path) -> dict[str, StatedValue]:
     return numbers
 
 
+def robot_of(file: Path) -> str:
+    """The robot that the summary.json beside a results.json names, or ""."""
+    try:
+        return str(json.loads(read_bytes(file.with_name("summary.json")))["robot"])
+    except (OSError, ValueError, TypeError, LookupError):
+        return ""
+
+
 def _problem(row: Any) -> tuple[str, str]:
     """The key of a number, and what is wrong with it, or ""."""
     if not isinstance(row, dict) or not isinstance(row.get("key"), str):
