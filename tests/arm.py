@@ -105,7 +105,7 @@ def motion(signal, cutoff=17.0) -> Motion:
 def models(signals, fits, predictions=(), fit="independent.lse", robot=ARM) -> list[JointModel | Diagnostic]:
     """What `predict` makes of the joints of a log, beside predictions."""
     entry = LogEntry(signals[0].log, (f"{signals[0].log}.csv",), signals[0].role, ())
-    return list(predict.apply([motion(s) for s in signals], predictions, fits, entry, robot, fit=fit))
+    return list(predict.apply([motion(s) for s in signals], predictions, [], fits, entry, robot, fit=fit))
 
 
 def write_csv(file: Path, signals, extra=None) -> None:

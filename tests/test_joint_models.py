@@ -147,5 +147,5 @@ def test_where_a_log_lacks_joints_of_the_chosen_model_that_of_the_joint_by_itsel
 
 def test_the_stage_has_a_record_of_its_own_for_every_joint_that_a_fit_describes(identified):
     signal, fits, _ = identified
-    made = list(predict.apply([arm.motion(signal)], [], fits, entry(), arm.ARM, fit="independent.lse"))
+    made = list(predict.apply([arm.motion(signal)], [], [], fits, entry(), arm.ARM, fit="independent.lse"))
     assert [record.key for record in made] == [("run", "hand_roll")]

@@ -65,6 +65,19 @@ class Context:
             return chosen[0]
         return self.own_fit(joint)
 
+    def used_record(self, joint: str) -> Fit | None:
+        """The chosen fit that the filter used; None if it used the fit of a joint by itself."""
+        setting, _, name = self.used_fit(joint).partition(".")
+        fits = [f for f in self.catalogue.records(Fit) if f"{f.model}.{f.estimator}" == name and setting == CHOSEN]
+        return next((f for f in fits if joint in self.efforts_of(f)), None)
+
+    def efforts_of(self, fit: Fit) -> list[str]:
+        """The joints whose efforts a fit describes, in their order."""
+        names = [joint.name for joint in self.study.robot.joints]
+        if fit.group in names:
+            return [fit.group]
+        return [name for name in names if any(str(p).endswith(f" of {name}") for p in fit.parameter)] or names
+
     def predicting_fits(self, joint: str) -> tuple[str, str]:
         """The names, in predictions, of the fit that the filter used, and of its refits without whole logs."""
         fit = self.used_fit(joint)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Choice, Fit, ModelSearch, Prediction
+from davinci_forces.records import Choice, ModelSearch, Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
@@ -20,7 +20,7 @@ from davinci_forces.report.content import (
     Verdict,
     literal,
 )
-from davinci_forces.report.context import Context, fit_name, title
+from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MEASURES, paper_or_screen
 
 MAX_RUNS_ON_PAPER = 9
@@ -61,7 +61,6 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         (table(context, choice, order, "Every candidate, the best first.", "candidates-table"),),
     )  # fmt: skip
     yield from unseen(context)
-    yield from parameters(context)
 
 
 def search_tables(context: Context) -> Iterator[Block]:
@@ -151,20 +150,3 @@ def unseen(context: Context) -> Iterator[Block]:
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
     table = Table("Relative error on logs that were not fitted.", header, rows, "choice-unseen", "lllrr")
     yield from paper_or_screen(table, "The chosen model and each joint by itself, run by run", MAX_RUNS_ON_PAPER)
-
-
-def parameters(context: Context) -> Iterator[Block]:
-    """The parameters of the chosen fits, where they are not those of a joint by itself."""
-    used = {context.used_fit(joint) for joint in (j.name for j in context.study.robot.joints)}
-    fits = [f for f in context.catalogue.records(Fit) if f"{CHOSEN}.{f.model}.{f.estimator}" in used]
-    tables = tuple(parameter_table(context, fit) for fit in fits if fit.model != "independent")
-    if tables:
-        yield OnScreen("Parameters of the chosen model", "chosen-parameters", tables)
-
-
-def parameter_table(context: Context, fit: Fit) -> Table:
-    """Every parameter with its standard error."""
-    key = ".".join(("fit", *fit.key))
-    rows = tuple((literal(str(name)), context.number(f"{key}.{slug(str(name))}", 2)) for name in fit.parameter)
-    caption = f"{title(fit.group)}: {fit_name(fit.model, fit.estimator)}, from {literal(', '.join(fit.logs))}."
-    return Table(caption, ("Parameter", "Value"), rows, f"chosen-{fit.group}", "lr")

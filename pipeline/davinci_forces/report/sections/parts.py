@@ -44,6 +44,11 @@ def run_name(log: str, joint: str) -> str:
     return f"{title(joint)} in {literal(log)}"
 
 
+def is_of_link(phi: str) -> bool:
+    """Whether a column of a regressor is of a link's parameter, which all joints of the arm share."""
+    return str(phi).startswith("partial")
+
+
 def contact_spans(context: Context, log: str, name: str) -> tuple[VSpan, ...]:
     """The windows of contact that the study states of a log, the first named in the legend."""
     windows = context.study.log(log).contact

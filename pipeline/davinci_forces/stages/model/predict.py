@@ -9,10 +9,13 @@ from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.periods.averaging import Phases
 from davinci_forces.maths.signals.faults import beyond_steps
+from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, UNSCORED_STRETCH, is_outside, spans
 from davinci_forces.records import (
+    Average,
     Choice,
     Counts,
     Diagnostic,
@@ -21,6 +24,7 @@ from davinci_forces.records import (
     JointModel,
     Motion,
     Prediction,
+    Residual,
     diagnostic,
 )
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
@@ -85,13 +89,16 @@ def predict_joint(
 def apply(
     motions: Collection[Motion],
     predictions: Collection[Prediction],
+    averages: Iterable[Average],
     fits: Iterable[Fit | Choice | FittedPaths],
     entry: LogEntry,
     robot: Robot,
     *,
     fit: str,
-) -> Iterator[JointModel | Diagnostic]:
+) -> Iterator[JointModel | Residual | Diagnostic]:
     """Evaluate the model of each joint along a log; a diagnostic says why a joint has none.
+
+    A chosen model also gets its residual in an identification log, as the fits of joints by themselves have theirs.
 
     Raises
     ------
@@ -104,6 +111,7 @@ def apply(
     along = LogModels(identified, motions)
     described = [joint for joint in along.joints if identified.fits_of(joint)]
     used = {joint: identified.fit_along(joint, fit, along.joints_on_clock(joint)) for joint in described}
+    periods = {average.joint: average for average in averages}
     refits = (
         refits_of(predictions, {joint: joint_fit for joint, (joint_fit, _) in used.items()}, fit) if is_fitted else {}
     )
@@ -122,7 +130,7 @@ def apply(
             continue
         path = SAME_PATH if is_fitted else identified.path(motion)
         refit = refits.get(motion.joint)
-        yield JointModel(
+        model = JointModel(
             log=motion.log, joint=motion.joint, role=motion.role, stand_in=stand_in, path=path,
             scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
@@ -131,6 +139,25 @@ def apply(
             unscored=unscored_flags(motion, is_scored(motion, along, joint_fit, entry)),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
+        yield model
+        if is_fitted and fit == CHOSEN and not motion.at_rest:
+            yield residual_of(model, periods.get(motion.joint))
+
+
+def residual_of(model: JointModel, average: Average | None) -> Residual:
+    """The chosen model's effort and the measured one, averaged over periods, or low-passed like the model's motion."""
+    columns = [model.dq, model.tau, model.tau_hat]
+    if average is None:
+        samples = slice(None, None, max(int(model.rate / (2.0 * model.cutoff)), 1))
+        smooth = (lowpass_segments(x, model.segment, model.rate, model.cutoff) for x in columns)
+        t, (dq, tau, tau_hat) = model.t[samples], (x[samples] for x in smooth)
+    else:
+        last = average.t_start + (average.periods * average.period - 0.5 / model.rate)
+        used = (model.t >= average.t_start - 0.5 / model.rate) & (model.t <= last) & (model.unscored == 0)
+        phased = Phases(model.t[used], average.period, len(average))
+        t, (dq, tau, tau_hat) = average.t, (phased.fold(x[used]).mean for x in columns)
+    name = f"{model.model}.{model.estimator}"
+    return Residual(model.log, model.joint, CHOSEN, name, model.rate, t=t, dq=dq, tau=tau, tau_hat=tau_hat)
 
 
 def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry) -> Booleans:

@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Fit, Identifiability, Residual
+from davinci_forces.records import Fit, Identifiability, Prediction, Residual
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
@@ -28,50 +28,99 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import run_name
+from davinci_forces.report.sections.parts import is_of_link, run_name
 from davinci_forces.report.verdicts import is_impossible
 
 
 def section(context: Context) -> Section | None:
-    """One subsection per joint."""
+    """One subsection per joint: the model that was used, then all fits beside it."""
     fits = context.own_fits()
     if not fits:
         return None
     joints = dict.fromkeys(fit.group for fit in fits)
-    parts = (
+    parts = [
         Section(title(joint), f"fit-{joint}", tuple(joint_blocks(context, [f for f in fits if f.group == joint])))
         for joint in joints
-    )
+    ]
+    if links := link_parameters(context, list(joints)):
+        parts.append(Section("Links", "fit-links", links))
     return Section("Joints", "joints", (intro(), *parts))
 
 
 def intro() -> Prose:
     """Explain the columns of the tables."""
     return Prose(
-        "The parameters of each joint are fitted to the averaged periods of its identification logs. The standard "
-        "error of a value has two parts: of noise, by the differences between periods, and of the model, by the change "
-        "without blocks of path, or with other friction. $z$ is the value over its standard error. A parameter with "
-        "$abs(z) < 2$ may be zero in a better model; one within two errors of noise of zero is called not significant."
+        "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
+        "two parts: noise, by the differences between periods, and model, by the change without blocks of path, or "
+        "with other friction. $z$ is the value over both. With $abs(z) < 2$ it may be zero in a better model."
     )
 
 
 def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     """The content about one joint."""
-    first = next((f for f in fits if f"{f.model}.{f.estimator}" == context.own_fit(f.group)), fits[0])
-    terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
-    yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
-    yield parameters(context, first)
-    yield from unidentified_parameters(context, first.group)
-    residuals = context.catalogue.select(Residual, joint=first.group, model=first.model, estimator=first.estimator)
+    joint = fits[0].group
+    plain = next((f for f in fits if f"{f.model}.{f.estimator}" == context.own_fit(joint)), fits[0])
+    used = context.used_record(joint) or plain
+    yield equation(joint, used)
+    yield parameters(context, joint, used)
+    if used is not plain:
+        yield Prose(compared_with_plain(context, joint, used, plain))
+    model, by = (used.model, used.estimator) if used is plain else (CHOSEN, f"{used.model}.{used.estimator}")
+    residuals = context.catalogue.select(Residual, joint=joint, model=model, estimator=by)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
         if i == 0:
             yield from shown
         else:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
-    yield from implausible(fits)
-    yield from left_out(context, first.group)
-    yield comparison(context, fits)
+    yield from unidentified_parameters(context, joint)
+    yield from implausible([used] if used is not plain else fits)
+    yield from left_out(context, joint)
+    yield comparison(context, fits, plain)
+
+
+def of_joint(fit: Fit, joint: str) -> list[int]:
+    """The rows of a fit's parameters of this joint alone: not those of links, nor of other joints."""
+    suffix = f" of {joint}" if fit.group != joint else ""
+    return [i for i, name in enumerate(map(str, fit.parameter)) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
+
+
+def equation(joint: str, fit: Fit) -> Equation:
+    """The effort of a joint as the sum of the links' effort, if the arm is coupled, and of its own terms."""
+    rows = of_joint(fit, joint)
+    names = [str(fit.parameter[i]).removesuffix(f" of {joint}") for i in rows]
+    terms = [f"theta_{number} {fit.phi[i]}".removesuffix(" 1") for number, i in enumerate(rows, start=1)]
+    if any(map(is_of_link, fit.phi)):
+        terms.insert(0, "sum_j beta_j Y_j (q, dot(q), dot.double(q))")
+        names.insert(0, "the links' parameters (coupling to the other joints)")
+    return Equation(f"tau = {' + '.join(terms)}", f"effort is the sum of {', '.join(names)}, each times its parameter")
+
+
+def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
+    """State what distinguishes the model in use from the joint by itself, and what it gains on unseen data."""
+    base = {str(name) for name in plain.parameter}
+    names = [str(used.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(used, joint)]
+    added = [name for name in names if name not in base]
+    row = context.efforts_of(used).index(joint)
+    changed = [f"it adds {' and '.join(', '.join(added).rsplit(', ', 1))}"] if added else []
+    changed += ["it couples the joint to the others"] if any(map(is_of_link, used.phi)) else []
+    if used.cutoff[row] != plain.cutoff[0]:
+        changed.append(
+            f"motion and effort pass a low-pass of {used.cutoff[row]:g} Hz instead of {plain.cutoff[0]:g} Hz"
+        )
+    if used.effort_lag[row]:
+        side = "after" if used.effort_lag[row] > 0 else "before"
+        changed.append(f"the effort is taken {1e3 * abs(used.effort_lag[row]):g} ms {side} the motion")
+    changed += [f"its estimator is {title_of(used.estimator)}"] if used.estimator != plain.estimator else []
+    text = f"Compared with the joint by itself ({fit_name(plain.model, plain.estimator)}): {'; '.join(changed)}."
+    unseen = [p for p in context.catalogue.select(Prediction, joint=joint, model=CHOSEN) if p.role != "identification"]
+    if not unseen:
+        return text
+    worst = max(unseen, key=lambda p: p.relative_error)
+    before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
+    after = context.number(f"{worst.prefix}.relative_error", 3)
+    where = f"In {literal(worst.log)}, its worst log of those not fitted"
+    return f"{text} {where}, the relative error is {after}; that of the joint by itself is {before}."
 
 
 def implausible(fits: list[Fit]) -> Iterator[Verdict]:
@@ -90,37 +139,53 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
         yield Verdict("warn" if clear else "info", text)
 
 
-def parameters(context: Context, fit: Fit) -> Table:
-    """Parameters with their standard errors and how far they are from zero.  Tables 6.4-6.6"""
-    rows: list[tuple[Cell, ...]] = []
-    for i, name in enumerate(fit.parameter):
-        key = ".".join(("fit", *fit.key, slug(name)))
-        z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
-        unit = format_unit(fit.unit[i]) or "–"
-        values = (context.number(f"{key}{part}", 2, unit="") for part in ("", ".std_noise", ".std_model"))
-        rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
+def parameters(context: Context, joint: str, fit: Fit) -> Table:
+    """The joint's parameters with their standard errors and how far they are from zero.  Tables 6.4-6.6"""
+    rows = of_joint(fit, joint)
+    table_rows = tuple(parameter_row(context, fit, i, f"$theta_{n}$", f" of {joint}") for n, i in enumerate(rows, 1))
+    coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
-        f"Parameters of the {literal(fit.group.replace('_', ' '))}. Model: {fit.model} (without coupling to other "
-        f"joints), {fit_in_use(context, fit)}. Estimator: {title_of(fit.estimator)}. Data: "
-        f"{literal(', '.join(fit.logs))}. Mean squared error of the averaged effort: {mse}.",
+        f"Parameters of the {literal(joint.replace('_', ' '))}. Model: {fit.model}. Estimator: "
+        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. Mean squared error of the effort: {mse}."
+        f"{coupled}",
         ("Symbol", "Parameter", "Unit", "Value", "Error of noise", "Error of the model", "$z$"),
-        tuple(rows),
-        label=f"theta-{fit.group}",
+        table_rows,
+        label=f"theta-{joint}",
         align="lllrrrr",
     )
 
 
-def fit_in_use(context: Context, fit: Fit) -> str:
-    """State whether the filter uses this fit or another."""
-    used = context.used_fit(fit.group)
-    if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
-        return "used by the filter"
-    return f"while the filter uses {fit_name(*used.split('.', 1))}"
+def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str = "") -> tuple[Cell, ...]:
+    """One parameter with its standard errors."""
+    name = str(fit.parameter[i])
+    key = ".".join(("fit", *fit.key, slug(name)))
+    z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
+    values = (context.number(f"{key}{part}", 2, unit="") for part in ("", ".std_noise", ".std_model"))
+    unit = format_unit(fit.unit[i]) or "–"
+    return symbol, literal(name.removesuffix(suffix)), unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"
 
 
-def comparison(context: Context, fits: list[Fit]) -> Block:
-    """Parameters of all fits side by side, and how well each describes the averaged periods."""
+def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
+    """The parameters of the links of each coupled model in use, which its joints share."""
+    used = {fit.key: fit for joint in joints if (fit := context.used_record(joint)) is not None}
+    tables = []
+    for fit in used.values():
+        rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
+        if rows:
+            header = ("", "Parameter", "Unit", "Value", "Error of noise", "Error of the model", "$z$")
+            moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
+            caption = (
+                f"Parameters of the links: {fit_name(fit.model, fit.estimator)}; they act on {moved}. Only these "
+                "combinations of masses, centres and inertias affect an effort. Each has the name of its first one."
+            )
+            body = tuple(parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1))
+            tables.append(Table(caption, header, body, f"links-{fit.group}", "lllrrrr"))
+    return tuple(tables)
+
+
+def comparison(context: Context, fits: list[Fit], plain: Fit) -> Block:
+    """The joint by itself: parameters of all fits side by side, how well each describes the data, and its residual."""
     names = list(dict.fromkeys(name for fit in fits for name in fit.parameter))
     rows: list[tuple[Cell, ...]] = []
     for fit in fits:
@@ -136,7 +201,10 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
     first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
+    residuals = context.catalogue.select(Residual, joint=group, model=plain.model, estimator=plain.estimator)
+    beside = context.used_record(group) is not None  # so that its residual is not shown above
     more = (
+        *(block for residual in residuals if beside for block in residual_blocks(context, residual, "-plain")),
         *estimators(context, first),
         *printed_beside(context, first),
         *convergence(context, group),

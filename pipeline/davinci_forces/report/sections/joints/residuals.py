@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Counts, Residual, Trajectory, Whiteness
-from davinci_forces.report.content import Block, Figure, Line, Panel, Points, Prose, Stems
+from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.report.content import Block, Figure, HBand, Line, Panel, Points, Prose
 from davinci_forces.report.context import Context, fit_name, label
 from davinci_forces.report.sections.parts import autocorrelation, effort_panel, run_name
 from davinci_forces.report.verdicts import percent
@@ -13,39 +14,39 @@ from davinci_forces.report.verdicts import percent
 LAGS = 50  # lags of the cross-correlation on either side
 MIN_SHARE_FOLLOWED = 0.1  # smallest share of a residual's variance by which the residual is said to follow a motion
 MIN_RATIO_REVERSALS = 2.0  # smallest remarked ratio of the residual around reversals to that elsewhere
+ADVICE = {
+    "position": "Worth trying: a spring, gravity or friction that varies with position, or coupling to other joints.",
+    "velocity": "Worth trying: friction with another shape, or coupling to other joints.",
+    "reversals": "Worth trying: presliding friction (a dahl element).",
+}
+ALL_TRIED = "No term that was tried for the choice of the model removes this."
 
 
-def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
-    """The residual of one log: over time, against the motion, and its autocorrelation."""
-    name = run_name(residual.log, residual.joint)
+def residual_blocks(context: Context, residual: Residual, label_end: str = "") -> Iterator[Block]:
+    """The residual of a fit in one log: over time, against the motion, and its autocorrelation."""
+    name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}{label_end}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
-    yield Figure(
-        f"{name}: averaged effort and model ({who}), and the residual of the model.",
-        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
-        (
-            effort_panel(residual, heading="Averaged effort and model"),
-            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
-        ),
-        f"fit-figure-{residual.log}-{residual.joint}",
-        columns=2,
-        height=42,
-    )  # fmt: skip
     moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
     q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    tests = [*against, *own_correlations(context, residual, errors, q)]
     yield Figure(
-        f"{name}: the residual against position and velocity (points: means in 40 equal bins of the range, bars: "
-        "their standard errors; line: mean of each direction), its autocorrelation, and its cross-correlation with the "
-        "motion.",
-        f"{name}: {in_words(residual, errors, q)}",
-        tuple(tests),
-        f"residual-figure-{residual.log}-{residual.joint}",
+        f"{name}: averaged effort and model ({who}), and the residual over time and against position and velocity "
+        "(points: means in 40 equal bins of the range, bars: their standard errors; line: mean of each direction), its "
+        "autocorrelation, and its cross-correlation with the motion (grey: 95 % band of white noise).",
+        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square). "
+        f"{in_words(residual, errors, q)}",
+        (
+            effort_panel(residual, heading="Averaged effort and model"),
+            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+            *against,
+            *own_correlations(context, residual, errors, q),
+        ),
+        f"fit-figure-{place}",
         columns=2,
-        height=38,
+        height=36,
     )
     yield Prose(in_words(residual, errors, q))
 
@@ -70,39 +71,40 @@ def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
 def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
     """The residual's correlation with itself and with the motion."""
     signal = f"tau.{residual.model}.{residual.estimator}"
+    band = 0.0
     for w in context.catalogue.select(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
         yield autocorrelation(w, "Autocorrelation")
+        band = w.band
     lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
     shown = lags.astype(np.float64)
-    position = () if q is None else (Line(shown, correlation(errors, q, lags), "with position", "green", "dashed"),)
-    marks = (
-        Stems(shown, correlation(errors, residual.dq, lags), "with velocity", "sky"),
-        Line(shown, correlation(errors, np.sign(residual.dq), lags), "with direction", "vermillion"),
+    position = () if q is None else (Line(shown, correlation(errors, q, lags), "position", "green", "dashed"),)
+    lines = (
+        Line(shown, correlation(errors, residual.dq, lags), "velocity", "blue"),
+        Line(shown, correlation(errors, np.sign(residual.dq), lags), "direction", "vermillion"),
         *position,
     )
-    yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-1.0, 1.0))
+    reach = max(4.0 * band, 0.1, *(1.1 * float(abs(line.y).max()) for line in lines))
+    marks = (HBand(-band, band, ""), *lines)
+    yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-reach, reach))
 
 
 def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
-    """State whether the residual follows position or velocity, and which terms to try.
+    """State whether the residual follows position or velocity, and which terms to try if none was searched for.
 
     Least squares leave no straight line in a variable that is a column of the model, so means in bins are used.
     """
+    is_plain = residual.model != CHOSEN
     motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
     shares = {name: explained_by(x, errors) for name, x in motions.items()}
     shares_in_words = " and ".join(f"{percent(max(share, 0.0))} against {name}" for name, share in shares.items())
     follows = max(shares, key=lambda name: shares[name])
     text = f"Share of the residual's variance that the means in bins explain: {shares_in_words}"
     if shares[follows] > MIN_SHARE_FOLLOWED:
-        tries = {
-            "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
-            "velocity": "friction with another shape, or coupling to other joints",
-        }
-        return f"{text}. So the residual follows the {follows}. Worth trying: {tries[follows]}."
+        return f"{text}. So the residual follows the {follows}. {ADVICE[follows] if is_plain else ALL_TRIED}"
     within = share_within_reversals(errors, residual.dq)
     if within > MIN_RATIO_REVERSALS:
         larger = f"Around reversals of velocity the residual's RMS is {within:.1f} times its RMS elsewhere"
-        return f"{text}. {larger}. Worth trying: presliding friction (a dahl element)."
+        return f"{text}. {larger}. {ADVICE['reversals'] if is_plain else ALL_TRIED}"
     return f"{text}. These plots show no missing term that depends on position alone or on velocity alone."
 
 
