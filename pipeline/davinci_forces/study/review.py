@@ -12,13 +12,14 @@ from davinci_forces.toml.lines import MAX_TABLES
 FILE = "review.toml"
 VERDICTS = ("accept", "doubt", "reject")
 SUBJECTS = ("figure", "run")  # subjects of a rating: a figure by its label, or a log by its name
+STUDY = "study"  # subject of the verdict on the whole study
 
 
 @dataclass(frozen=True)
 class Rating:
-    """One reviewer's rating of a figure or a run, and the SHA-256 of the results.json that he saw."""
+    """One reviewer's rating of a figure, a run or the study, and the SHA-256 of the results.json that was seen."""
 
-    subject: str  # of SUBJECTS
+    subject: str  # of SUBJECTS, or STUDY
     name: str
     verdict: str  # of VERDICTS
     comment: str
@@ -28,7 +29,7 @@ class Rating:
 
 
 def read(file: Path) -> tuple[Rating, ...]:
-    """Read the ratings of a file, in its order.
+    """Read the ratings of a file, in its order, and last its verdict on the study, if it has one.
 
     Raises
     ------
@@ -37,6 +38,8 @@ def read(file: Path) -> tuple[Rating, ...]:
     """
     table = toml.read(file, BadStudy)
     ratings = tuple(_rating(entry) for entry in table.tables("rating", most=MAX_TABLES))
+    if "verdict" in table:
+        ratings = (*ratings, _content(STUDY, "", table.table("verdict")))
     table.close()
     table.file.refuse(BadStudy)
     return ratings
@@ -47,9 +50,13 @@ def _rating(table: TomlTable) -> Rating:
     if len(subjects) != 1:
         table.problem('give what is rated, as either figure = "<its label>" or run = "<its log>"')
     subject = subjects[0] if subjects else SUBJECTS[0]
+    return _content(subject, table.text(subject, "" if not subjects else None), table)
+
+
+def _content(subject: str, name: str, table: TomlTable) -> Rating:
     rating = Rating(
         subject,
-        table.text(subject, "" if not subjects else None),
+        name,
         table.text("verdict", choices=VERDICTS),
         table.text("comment", ""),
         table.text("reviewer", ""),

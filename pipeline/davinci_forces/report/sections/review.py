@@ -6,7 +6,7 @@ from hashlib import sha256
 from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import paper_or_screen
-from davinci_forces.study.review import Rating
+from davinci_forces.study.review import STUDY, Rating
 
 MARKS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 
@@ -58,6 +58,8 @@ def row(context: Context, rating: Rating, same: bool) -> tuple[Cell, ...]:
 
 def subject(context: Context, rating: Rating) -> str:
     """The rated subject: a figure of this report by its number, anything else by its name."""
+    if rating.subject == STUDY:
+        return "the study"
     if rating.subject == "figure" and rating.name in context.labels:
         return f"[@{rating.name}]"
     here = rating.subject == "run" and rating.name in [log.name for log in context.study.logs]

@@ -12,8 +12,11 @@ const tomlText = (text) =>
 
 function reviewToml() {
   const lines = ["# Ratings of a report by davinci-forces: keep this file as review.toml beside study.toml."];
-  for (const rating of ratings) {
-    lines.push("", "[[rating]]", `${rating.subject} = ${tomlText(rating.name)}`);
+  const ofStudy = (rating) => rating.subject === "study";
+  const verdict = ratings.findLast(ofStudy); // TOML has a single table [verdict]
+  for (const rating of [...ratings.filter((rating) => !ofStudy(rating)), ...(verdict ? [verdict] : [])]) {
+    if (rating === verdict) lines.push("", "[verdict]");
+    else lines.push("", "[[rating]]", `${rating.subject} = ${tomlText(rating.name)}`);
     for (const key of ["verdict", "comment", "reviewer", "date", "results"]) lines.push(`${key} = ${tomlText(rating[key])}`);
   }
   return `${lines.join("\n")}\n`;
@@ -66,6 +69,7 @@ const tools = newElement("div", "", { class: "tools" });
 tools.append(
   runs,
   newButton("Rate this run", "", () => openRating("run", runs.value, `run ${runs.value}`)),
+  newButton("Verdict on the study", "", () => openRating("study", "", "the study")),
   newButton("Export review.toml", "", () => {
     save(reviewToml(), "review.toml", "application/toml", "");
     unsaved = false;

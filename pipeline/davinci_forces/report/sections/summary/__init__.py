@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, PathShare, Prediction, Record, Stiffness, Track
+from davinci_forces.records import Contact, Diagnostic, PathShare, Prediction, Record, Track
 from davinci_forces.report.content import (
     Block,
     Bullets,
@@ -23,6 +23,13 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.summary.opening import (
+    listed,
+    measured,
+    nothing_identified,
+    sign_off,
+    verdict_sentence,
+)
 from davinci_forces.report.verdicts import (
     CAUTION,
     COVERED,
@@ -35,6 +42,7 @@ from davinci_forces.report.verdicts import (
     is_mostly_constant,
     percent,
 )
+from davinci_forces.robots.robot import Kind
 
 
 def section(context: Context) -> Section:
@@ -45,10 +53,14 @@ def section(context: Context) -> Section:
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield from failures(context)
-    if not context.own_fits():
-        yield nothing_identified(context)
-        return
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
+    if trusts:
+        yield Prose(f"**{verdict_sentence(context, trusts)}**")
+    yield from measured(context)
+    if not trusts:
+        yield from nothing_identified(context)
+        yield sign_off(context)
+        return
     contacts = context.catalogue.records(Contact)
     yield Prose(opening_paragraph(context, trusts, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
@@ -63,15 +75,7 @@ def blocks(context: Context) -> Iterator[Block]:
     yield trust_table(context, trusts)
     yield Prose(thresholds_in_words(trusts))
     yield from first_looks(context, trusts)
-    yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
-
-
-def nothing_identified(context: Context) -> Verdict:
-    """State that no joint was identified, and refer to the tissue that sensors measured."""
-    text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
-    if context.catalogue.records(Stiffness):
-        return Verdict("info", f"{text} Tissue measured by sensors is in [@tissue].")
-    return Verdict("bad", text)
+    yield sign_off(context)
 
 
 def thresholds_in_words(trusts: list[Trust]) -> str:
@@ -123,9 +127,9 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     windows = sum(len(contact) for contact in contacts)
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
-        "External effort is what the robot exerts on its environment: torque [N m] at joints that turn, force [N] at "
-        f"joints that slide. It was estimated on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the "
-        f"{literal(context.study.robot.title)}, from motor currents and joint positions, without a force sensor. "
+        f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
+        f"on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the {literal(context.study.robot.title)}, "
+        "from motor currents and joint positions, without a force sensor. "
     )
     if not windows:
         return text + "The study states no contact windows, so no contact is measured."
@@ -133,6 +137,17 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
         f"**In {above} of {count(windows, 'contact')} (one window on one joint), the effort exceeds the detection "
         "level.** Smaller efforts cannot be distinguished from the model's error."
     )
+
+
+def efforts_in_words(context: Context) -> str:
+    """The efforts of the robot's joints with their units."""
+    kinds = {(joint.kind, joint.effort) for joint in context.study.robot.joints}
+    words = {
+        (Kind.REVOLUTE, ""): "torque [N m] at joints that turn",
+        (Kind.PRISMATIC, ""): "force [N] at joints that slide",
+    }
+    currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
+    return listed([*(text for kind, text in words.items() if kind in kinds), *currents])
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
