@@ -31,7 +31,6 @@ from davinci_forces.report.sections.summary.opening import (
     verdict_sentence,
 )
 from davinci_forces.report.verdicts import (
-    CAUTION,
     COVERED,
     DETECTABLE,
     DETECTED,
@@ -43,6 +42,9 @@ from davinci_forces.report.verdicts import (
     percent,
 )
 from davinci_forces.robots.robot import Kind
+
+MAX_IN_COLUMN = 3  # panels below each other on page one
+FIGURE_HEIGHT, LINE_HEIGHT = 65.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
 def section(context: Context) -> Section:
@@ -56,7 +58,8 @@ def blocks(context: Context) -> Iterator[Block]:
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{verdict_sentence(context, trusts)}**")
-    yield from measured(context)
+    if lines := measured(context):
+        yield Bullets(lines)
     if not trusts:
         yield from nothing_identified(context)
         yield sign_off(context)
@@ -70,40 +73,31 @@ def blocks(context: Context) -> Iterator[Block]:
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(in_column(panels)),
             label="answer-figure",
-            height=27,
+            columns=2 if len(panels) > MAX_IN_COLUMN else 1,
+            height=panel_height(len(panels), len(lines)),
         )
     yield trust_table(context, trusts)
-    yield Prose(thresholds_in_words(trusts))
+    yield Prose(rule_in_words(trusts))
     yield from first_looks(context, trusts)
     yield sign_off(context)
 
 
-def thresholds_in_words(trusts: list[Trust]) -> str:
-    """State in words the thresholds of the table's verdicts."""
-    by_error = (
-        f"on a path that was not fitted, the model error is at most {percent(GOOD)} of the effort (root mean square). "
-        f"Caution: at most {percent(CAUTION)}, on any path"
-    )
-    by_level = (
-        "the detection level is at most a third of `effort` in study.toml, the effort sought. Caution: at most `effort`"
-    )
+def rule_in_words(trusts: list[Trust]) -> str:
+    """State in words what the verdicts of the table follow from."""
     stated = [trust.sought is not None for trust in trusts]
-    rule = by_level if all(stated) else f"{by_level}. Good, without `effort`: {by_error}" if any(stated) else by_error
-    return (
-        f"Each row shows the joint's worst run (one joint in one log) that was not fitted. Good: {rule}. A band is "
-        f"right if its coverage is {percent(COVERED[0])} to {percent(COVERED[1])}. See [@thresholds]."
-    )
+    by_level = "detection level over the effort sought"
+    by_error = "model error over effort"
+    rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
+    return f"Each row is the joint's worst run that was not fitted. Verdicts follow from {rule}, by [@thresholds]."
 
 
 def caption(contacts: list[Contact]) -> str:
     """The caption of the figure."""
-    level = "The grey band holds 95 % of the samples in free space, where nothing touches the robot."
+    level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort on each joint in its worst run that was not fitted. {level}"
-    return (
-        "External effort on each joint, in its contact log with the largest model error. Contact windows are shaded, "
-        f"and their peaks marked. {level}"
-    )
+    which = "in its contact log with the largest model error, contact windows shaded"
+    return f"External effort on each joint {which}. {level}"
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -128,15 +122,12 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
-        f"on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the {literal(context.study.robot.title)}, "
-        "from motor currents and joint positions, without a force sensor. "
+        f"on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the {literal(context.study.robot.title)}."
     )
     if not windows:
-        return text + "The study states no contact windows, so no contact is measured."
-    return text + (
-        f"**In {above} of {count(windows, 'contact')} (one window on one joint), the effort exceeds the detection "
-        "level.** Smaller efforts cannot be distinguished from the model's error."
-    )
+        return f"{text} No contact is measured, as the study states no contact windows."
+    found = f"In {above} of {count(windows, 'contact')} (one window on one joint)"
+    return f"{text} **{found}, the effort exceeds the detection level.**"
 
 
 def efforts_in_words(context: Context) -> str:
@@ -171,10 +162,11 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
 
 
 def in_column(panels: list[Panel]) -> Iterator[Panel]:
-    """Panels below each other: the first has the legend, the last names the time."""
+    """Panels in columns: the first has the legend, the last of each column names the time."""
+    lowest = len(panels) - (2 if len(panels) > MAX_IN_COLUMN else 1)
     for i, panel in enumerate(panels):
         marks = panel.marks if i == 0 else tuple(replace(mark, label="") for mark in panel.marks)
-        yield replace(panel, marks=marks, x_label=panel.x_label if i == len(panels) - 1 else "")
+        yield replace(panel, marks=marks, x_label=panel.x_label if i >= lowest else "")
 
 
 def joints_touched(context: Context, contact: Contact) -> list[Contact]:
@@ -197,6 +189,12 @@ def spoken(contact: Contact) -> str:
     """The peaks of a log in words, for those who cannot see the figure."""
     unit = contact.origin.units["peak"] if contact.origin else ""
     return f"{contact.joint.replace('_', ' ')} peaks at {', '.join(f'{p:+.3g}' for p in contact.peak)} {unit}"
+
+
+def panel_height(panels: int, lines: int) -> float:
+    """The height [mm] of each of the panels that leaves room on page one for the table and for lines of results."""
+    room = FIGURE_HEIGHT - LINE_HEIGHT * (lines + max(panels - MAX_IN_COLUMN, 0))
+    return room / min(panels, MAX_IN_COLUMN)
 
 
 def trust_table(context: Context, trusts: list[Trust]) -> Table:
@@ -300,9 +298,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
-        narrow = f"the 95 % band is too narrow: it covers {percent(space.coverage)} of free-space samples. "
-        remedy = f"Compare contacts with the detection level.{see_runs}"
-        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
+        narrow = f"the 95 % band covers only {percent(space.coverage)} of free-space samples."
+        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:

@@ -6,41 +6,47 @@ from hashlib import sha256
 import numpy as np
 
 from davinci_forces.records import Stiffness, Weight
-from davinci_forces.report.content import Block, Bullets, Prose, Verdict, literal
+from davinci_forces.report.content import Prose, Verdict, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections import tissue
 from davinci_forces.report.sections.review import MARKS
-from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band_in_words, mass_level, percent
+from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent
 from davinci_forces.study.review import STUDY
 
-MAX_MEASURED = 4  # masses and stiffnesses on page one
+MAX_MEASURED = 3  # masses and stiffnesses on page one
+MAX_NAMED = 3  # joints that a clause of the verdict names
 TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject"
 
 
 def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that can be believed, and what limits the others."""
-    fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow and trusted.space]
+    fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow]
     levels = [
-        f"above {context.size(trusted.space, 'detection_level', trusted.space.detection_level)} on the "
-        f"{name_in_sentence(trusted.joint)}"
-        for trusted in fine
-        if trusted.space is not None
+        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on the {name_in_sentence(t.joint)}"
+        for t in fine
+        if t.space is not None
     ]
-    believed = [f"efforts {listed(levels)} can be believed"] if levels else []
-    text = "; ".join([*believed, *(doubt(trusted) for trusted in trusts if trusted not in fine)])
+    parts = [f"efforts {listed(levels)} can be believed"] if levels else []
+    parts += errors([trusted for trusted in trusts if trusted not in fine])
+    narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
+    which = f"the {listed(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
+    parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["the 95 % bands are right or too wide"]
+    text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def doubt(trusted: Trust) -> str:
-    """State what limits the trust in a joint."""
-    name = f"the {name_in_sentence(trusted.joint)}"
-    if trusted.prediction is None:
-        return f"{name} was not tested on any run"
-    path = "the path that was fitted" if trusted.same_path else "an unseen path"
-    too_much = ", too much to be believed" if trusted.level == "bad" and not trusted.sought else ""
-    hidden = ", and efforts that the study seeks are hidden" if trusted.fineness > DETECTABLE else ""
-    band = f"; its band is {band_in_words(trusted.space.coverage)}" if trusted.space is not None else ""
-    return f"{name} errs by {percent(trusted.share)} on {path}{too_much}{hidden}{band}"
+def errors(trusts: Sequence[Trust]) -> Iterator[str]:
+    """State the model errors of joints that are not fine, those of one kind of path and one verdict together."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for trusted in trusts:
+        name = f"the {name_in_sentence(trusted.joint)}"
+        path = "the fitted path" if trusted.same_path else "an unseen path"
+        level, error = trusted.level, f"{percent(trusted.share)} on {name}"
+        if trusted.fineness > DETECTABLE:
+            level, error = "bad", f"{error}, whose detection level is above the effort sought"
+        kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
+    for (path, why), joints in kinds.items():
+        yield f"on {path} the model errs by {listed(joints)}{f', {why}' if why else ''}"
 
 
 def name_in_sentence(joint: str) -> str:
@@ -53,13 +59,11 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join(", ".join(parts).rsplit(", ", 1))
 
 
-def measured(context: Context) -> Iterator[Block]:
-    """The masses beside the stated ones and the stiffnesses with their quartiles, with verdicts."""
-    texts = [*masses(context), *stiffnesses(context)]
-    if texts:
-        more = f" [{count(len(texts) - MAX_MEASURED, 'more log')} below.]" if texts[MAX_MEASURED:] else ""
-        yield Prose(f"**Measured:**{more}")
-        yield Bullets(tuple(texts[:MAX_MEASURED]))
+def measured(context: Context) -> tuple[str, ...]:
+    """The masses beside the stated ones and the stiffnesses with their quartiles, with verdicts, a line each."""
+    lines = [*masses(context), *stiffnesses(context)]
+    more = [f"{count(len(lines) - MAX_MEASURED, 'more log')}: see the contents."] if lines[MAX_MEASURED:] else []
+    return (*lines[:MAX_MEASURED], *more)
 
 
 def masses(context: Context) -> Iterator[str]:
@@ -67,17 +71,17 @@ def masses(context: Context) -> Iterator[str]:
     for weight in context.catalogue.records(Weight):
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
-        text = f"**{literal(weight.log)}**: mass {mass}{stated}. See [@weight]."
-        yield f"{WORDS.get(mass_level(weight)[0], '')} {text}".strip()
+        yield f"{WORDS.get(mass_level(weight)[0], '')} **{literal(weight.log)}**: mass {mass}{stated}".strip()
 
 
 def stiffnesses(context: Context) -> Iterator[str]:
     """The stiffness of each tissue log with its standard error, and the quartiles of its pushes."""
     for log in context.catalogue.records(Stiffness):
-        graded = tissue.verdict(context, log)
-        low, high = context.numbers(f"tissue.{log.log}", ("stiffness_q1", "stiffness_q3"))
-        quartiles = f" Half of the pushes lie between {low} and {high}." if log.pushes > 1 else ""
-        yield f"{WORDS.get(graded.level, '')} {graded.text}{quartiles} See [@tissue].".strip()
+        level = tissue.verdict(context, log).level
+        stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
+        quartiles = f", quartiles {low} and {high}" if log.pushes > 1 else ""
+        pushes = f" ({log.pushes} of {tissue.pushes(len(log))})"
+        yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{pushes}".strip()
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
