@@ -4,8 +4,8 @@ A damaged file can crash such a library, keep it busy for ever, or make it reque
 the child process is lost, and the file is a `BadLog` like any other.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 from davinci_forces.errors import BadLog
 from davinci_forces.files import require_file
 from davinci_forces.logs.isolated.process import ChildEnded, Message, child
-from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, read_ahead
+from davinci_forces.logs.log import Block, Log, Options, read_ahead
 from davinci_forces.maths.arrays import Array
 
 SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
@@ -27,14 +27,19 @@ MAX_COMPRESSION = 2000  # size of the samples over that of the file, at most; th
 HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hold a few samples
 
 
-def require(path: Path, package: str, extra: str) -> None:
-    """Require the package that reads a format, and say how to install it.
+def reader(module: str, package: str = "", extra: str = "") -> Callable[[Path, Options], Log]:
+    """Make the `read` of a format from the module that reads it in a child process; both raise BadLog."""
 
-    Raises
-    ------
-    BadLog
-        If the package is not installed.
-    """
+    def read(path: Path, options: Options) -> Log:
+        if package:
+            require(path, package, extra)
+        return start(path, options, module)
+
+    return read
+
+
+def require(path: Path, package: str, extra: str) -> None:
+    """Require the package that reads a format, and say how to install it; raises BadLog where it is not."""
     if find_spec(package) is None:
         raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")
 
@@ -49,10 +54,8 @@ def start(path: Path, options: Options, reader: str) -> Log:
     """
     request = _request(path, options, reader)
     for message, _ in _answers(path, request):
-        state = message["log"]
-    channels = tuple(Channel(**channel) for channel in state.pop("channels"))
-    clock = Clock(**clock) if (clock := state.pop("clock")) else None
-    return IsolatedLog(path, channels=channels, clock=clock, request=request, **state)
+        state = message
+    return IsolatedLog(path, request=request, **state)
 
 
 @dataclass
@@ -95,7 +98,7 @@ def _request(path: Path, options: Options, reader: str) -> Message:
     return {
         "reader": reader,
         "path": str(path.absolute()),
-        "options": asdict(options),
+        "options": options,
         "names": None,
         "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND,

@@ -1,22 +1,23 @@
 """The child process: opens logs and reads their blocks for its parent, within limits that the system enforces."""
 
 import os
+import pickle
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.isolated.process import Message, receive, send
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.isolated.process import Message, send
+from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 
 Answer = tuple[Message, list[Array]]
 FINAL_FIELDS = ("facts", "warnings", "comments", "dropped", "cut")
+FIELDS = ("format", "channels", "clock", "time", "started", "zone", *FINAL_FIELDS)
 
 
 def serve() -> None:
@@ -27,7 +28,7 @@ def serve() -> None:
     child = Child()
     with suppress(EOFError, BrokenPipeError):
         while True:
-            _answer(child, receive(sys.stdin.buffer)[0], answers)
+            _answer(child, pickle.load(sys.stdin.buffer)[0], answers)
 
 
 def _answer(child: "Child", request: Message, answers: IO[bytes]) -> None:
@@ -64,7 +65,7 @@ class Child:
         log = self._opened(request)
         names = request["names"]
         if names is None:
-            yield {"log": _described(log)}, []
+            yield {name: getattr(log, name) for name in FIELDS}, []
             return
         for block in log.blocks(names):
             yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
@@ -76,16 +77,9 @@ class Child:
         key = (request["reader"], path, request["options"], about.st_mtime_ns, about.st_size)
         if self.log is None or self.key != key:
             self.forget()
-            options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in request["options"].items()}
-            self.log = import_module(request["reader"]).open_in_child(path, Options(**options))
+            self.log = import_module(request["reader"]).open_in_child(path, request["options"])
             self.key = key
         return self.log
-
-
-def _described(log: Log) -> dict[str, Any]:
-    fields = {name: getattr(log, name) for name in ("format", "time", "started", "zone", *FINAL_FIELDS)}
-    clock = asdict(log.clock) if log.clock else None
-    return {**fields, "clock": clock, "channels": [asdict(channel) for channel in log.channels]}
 
 
 def _limit(memory: int, seconds: float) -> None:

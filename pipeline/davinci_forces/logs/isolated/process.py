@@ -2,8 +2,8 @@
 
 import atexit
 import ctypes
-import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,8 +12,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer
 from typing import IO, Any
-
-import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
@@ -32,35 +30,9 @@ PR_SET_PDEATHSIG = 1  # of Linux's prctl(2): the signal that a process gets when
 
 
 def send(stream: IO[bytes], message: Message, columns: Sequence[Array] = ()) -> None:
-    """Write a message and columns of equal length."""
-    rows = len(columns[0]) if columns else 0
-    stream.write(json.dumps(message | {"shape": [len(columns), rows]}).encode() + b"\n")
-    for column in columns:
-        stream.write(np.ascontiguousarray(column, np.float64).data)
+    """Write a message and columns of samples."""
+    pickle.dump((message, columns), stream, protocol=5)
     stream.flush()
-
-
-def receive(stream: IO[bytes]) -> tuple[Message, list[Array]]:
-    """Read a message and its columns.
-
-    Raises
-    ------
-    EOFError
-        If the other process has ended.
-    """
-    line = stream.readline()
-    if not line.endswith(b"\n"):
-        raise EOFError
-    message = json.loads(line)
-    columns, rows = message.pop("shape")
-    return message, [_column(stream, rows) for _ in range(columns)]
-
-
-def _column(stream: IO[bytes], rows: int) -> Array:
-    content = stream.read(8 * rows)
-    if len(content) < 8 * rows:
-        raise EOFError
-    return np.frombuffer(content, np.float64)
 
 
 class ChildEnded(Exception):
@@ -95,10 +67,10 @@ class Child:
             send(self.process.stdin, request)
             while more:
                 with self._within(request["seconds"]):
-                    message, columns = receive(self.process.stdout)
+                    message, columns = pickle.load(self.process.stdout)
                 more = message.pop("more", False)
                 yield message, columns
-        except (EOFError, OSError) as error:
+        except (EOFError, OSError, pickle.UnpicklingError) as error:
             raise ChildEnded(self._why(request)) from error
 
     @contextmanager

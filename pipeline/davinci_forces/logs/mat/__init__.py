@@ -2,25 +2,11 @@
 
 from pathlib import Path
 
-from davinci_forces.files import open_file
-from davinci_forces.logs import isolated
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.isolated import reader
+
+read = reader("davinci_forces.logs.mat.variables")
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file begins with MATLAB's header, or has the suffix .mat and is not text."""
     return head.startswith(b"MATLAB ") or (path.suffix.lower() == ".mat" and b"\0" in head[:20])
-
-
-def read(path: Path, options: Options) -> Log:
-    """Open the file and list its variables.
-
-    Raises
-    ------
-    BadLog
-        If it cannot be read, or is of version 7.3 and h5py is not installed.
-    """
-    with open_file(path) as file:
-        if file.read(512).startswith(b"MATLAB 7.3"):
-            isolated.require(path, "h5py", "hdf5")
-    return isolated.start(path, options, "davinci_forces.logs.mat.variables")

@@ -14,6 +14,7 @@ from scipy.io.matlab import MatlabFunction, MatlabOpaque
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
+from davinci_forces.logs.isolated import require
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.logs.mat.objects import (
     FUNCTION,
@@ -57,6 +58,7 @@ def open_in_child(path: Path, options: Options) -> Log:
 
 
 def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
+    require(path, "h5py", "hdf5")
     import h5py
 
     from davinci_forces.logs.hdf5.datasets import arrays_of
