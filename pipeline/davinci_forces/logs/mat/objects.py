@@ -1,94 +1,25 @@
 """Read the objects of a MATLAB file of version 5 to 7.2: tables, timeseries and strings, which it stores apart.
 
-Variables and objects are elements of 8-byte aligned parts.  An object's variable holds numbers of objects; a last
-element without a name, the subsystem, holds the properties of all objects as a file within the file.
+An object's variable holds numbers of objects; a last one without a name, the subsystem, holds the properties of all
+objects as a file within the file.
 Source: MathWorks ("MAT-File Format"); for the subsystem, which is not documented, the notes of PyPI's mat-io.
 """
 
-import struct
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
 
-from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import NUMBER_KINDS
 from davinci_forces.maths.arrays import Array, Integers
 
-MAT_HEADER_BYTES = 128  # [bytes] of a file
-HEAD = 4096  # [bytes] of an element, which hold its name, its class and the numbers of its objects
-COMPRESSED, TEXT, SPARSE, FUNCTION, OPAQUE = 15, 4, 5, 16, 17
-NUMBER_CLASSES = range(6, 16)  # classes: double, single, and the integers
 OBJECT_MARK = 0xDD000000  # before the numbers of objects
 MAX_OBJECTS = 1000
 UNNAMED = "__function_workspace__"  # scipy's name of an element without one
-
-
-@dataclass(frozen=True)
-class Element:
-    """A variable, as its header describes it."""
-
-    name: str
-    kind: int  # its class in MATLAB's numbering
-    shape: tuple[int, ...] = ()
-    class_name: str = ""  # of an object
-    content: bytes = b""  # of an object: the matrix of its numbers, with its tag
-
-
-def elements(path: Path) -> Iterator[Element]:
-    """List the variables of a file.
-
-    Raises
-    ------
-    ValueError
-        If the file ends within a variable.
-    """
-    with open_file(path) as file:
-        order = _order(file.read(MAT_HEADER_BYTES)[126:])
-        size = path.stat().st_size
-        while tag := file.read(8):
-            kind, length = struct.unpack(f"{order}II", tag)
-            position = file.tell() + length
-            if position > size:
-                raise ValueError(f"the file ends within a variable: {length} bytes after byte {position - length}")
-            head = file.read(min(length, HEAD))
-            element = _element(zlib.decompressobj().decompress(head, HEAD) if kind == COMPRESSED else tag + head, order)
-            if element.name:
-                yield element
-            file.seek(position)
-
-
-def _order(mark: bytes) -> str:
-    return ">" if mark == b"MI" else "<"
-
-
-def _element(head: bytes, order: str) -> Element:
-    flags, at = _part(head, 8, order)
-    kind = flags[0] if order == "<" else flags[3]
-    if kind == OPAQUE:
-        name, at = _part(head, at, order)
-        _, at = _part(head, at, order)  # the system that the class belongs to
-        class_name, at = _part(head, at, order)
-        return Element(name.decode(), kind, (), class_name.decode("utf-8", "replace"), head[at:])
-    dimensions, at = _part(head, at, order)
-    shape = struct.unpack(f"{order}{len(dimensions) // 4}i", dimensions)
-    return Element(_part(head, at, order)[0].decode(), kind, shape)
-
-
-def _part(content: bytes, at: int, order: str) -> tuple[bytes, int]:
-    """Read the part at a position, and return the position of the next; up to 4 bytes are stored in the tag."""
-    (word,) = struct.unpack_from(f"{order}I", content, at)
-    if word >> 16:
-        return content[at + 4 : at + 4 + (word >> 16)], at + 8
-    (length,) = struct.unpack_from(f"{order}I", content, at + 4)
-    return content[at + 8 : at + 8 + length], at + 8 + -(-length // 8) * 8
 
 
 @dataclass(frozen=True)
@@ -107,14 +38,10 @@ def is_object(value: Any) -> bool:
 
 
 class Objects:
-    """The objects of a file."""
+    """The objects of a file; `workspace` is the variable without a name, which holds their properties."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.count = path, 0
-
-    def of_element(self, element: Element) -> list[MatlabObject]:
-        """Read the objects of a variable."""
-        return self.read(_loaded(self.header, element.content))
+    def __init__(self, workspace: BytesIO | None) -> None:
+        self.workspace, self.count = workspace, 0
 
     def read(self, reference: Any) -> list[MatlabObject]:
         """Read the objects with these numbers.
@@ -134,30 +61,21 @@ class Objects:
         return [MatlabObject(self._class(numbers[-1]), self._properties(number)) for number in ids]
 
     @cached_property
-    def header(self) -> bytes:
-        """The header of the file, with the byte order."""
-        with open_file(self.path) as file:
-            return file.read(MAT_HEADER_BYTES)
-
-    @cached_property
     def cells(self) -> Any:
         """Cells of the subsystem: the layout, an unused cell, the values of all properties, and their defaults last."""
-        order = _order(self.header[126:])
-        (position,) = struct.unpack(f"{order}Q", self.header[116:124])
-        with open_file(self.path) as file:
-            size = self.path.stat().st_size
-            file.seek(position if MAT_HEADER_BYTES <= position < size else size)
-            tag = file.read(8)
-            if len(tag) < 8 or (length := struct.unpack(f"{order}II", tag)[1]) > size:
-                raise ValueError("the file holds no properties of objects")
-            stored = _loaded(self.header, tag + file.read(length)).tobytes()
-        return _loaded(self.header[:124] + stored[:4], stored[8:])[0, 0]["MCOS"][0]["arr"].ravel()
+        if self.workspace is None:
+            raise ValueError("the file holds no properties of objects")
+        stored = loadmat(self.workspace)[UNNAMED].tobytes()  # type: ignore[arg-type]
+        inner = BytesIO(self.workspace.getvalue()[:124] + stored[:4] + stored[8:])
+        return loadmat(inner)[UNNAMED][0, 0]["MCOS"][0]["arr"].ravel()  # type: ignore[arg-type]
 
     @cached_property
     def layout(self) -> tuple[list[str], list[Integers]]:
         """Names of classes and properties, and the four tables: classes, saved properties, objects, properties."""
         content = self.cells[0].tobytes()
-        numbers = np.frombuffer(content, f"{_order(self.header[126:])}i4")
+        assert self.workspace
+        is_big_endian = self.workspace.getvalue()[126:128] == b"MI"
+        numbers = np.frombuffer(content, ">i4" if is_big_endian else "<i4")
         offsets = numbers[2:7]
         names = content[40 : offsets[0]].decode("utf-8", "replace").split("\0")
         return names, [numbers[a // 4 : b // 4] for a, b in pairwise(offsets)]
@@ -174,11 +92,6 @@ class Objects:
         for name, kind, value in _record(saved if of_saved else plain, of_saved or of_plain):
             properties[names[name - 1]] = self.cells[2 + value] if kind == 1 else np.array([[value]])
         return {name.strip("_"): value for name, value in properties.items()}
-
-
-def _loaded(header: bytes, element: bytes) -> Any:
-    """Read an element without a name, as a file of its own."""
-    return loadmat(BytesIO(header + element), appendmat=False)[UNNAMED]  # type: ignore[arg-type]
 
 
 def _record(table: Integers, number: int) -> list[list[int]]:

@@ -9,30 +9,24 @@ from typing import Any
 
 import numpy as np
 from scipy.io import loadmat, whosmat
-from scipy.io.matlab import MatlabFunction, MatlabOpaque
+from scipy.io.matlab import MatlabFunction, MatlabOpaque, varmats_from_mat
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
-from davinci_forces.logs.isolated import require
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.logs.mat.objects import (
-    FUNCTION,
-    NUMBER_CLASSES,
-    OPAQUE,
-    SPARSE,
-    TEXT,
-    Element,
     MatlabObject,
     Objects,
-    elements,
     is_object,
     seconds,
     text_of,
     uniform_times,
-)  # fmt: skip
+)
 
 MAX_ELEMENTS = 1000  # of a struct array or a cell array
+NESTED = ("cell", "struct", "object", "char", "unknown")  # classes of variables that are not numbers
+OBJECT = "None"  # scipy's name of a variable that holds an object
 
 
 def open_in_child(path: Path, options: Options) -> Log:
@@ -58,7 +52,6 @@ def open_in_child(path: Path, options: Options) -> Log:
 
 
 def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
-    require(path, "h5py", "hdf5")
     import h5py
 
     from davinci_forces.logs.hdf5.datasets import arrays_of
@@ -69,21 +62,15 @@ def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
 def _of_matlab(path: Path, log: Log) -> Iterator[NamedArray]:
     with open_file(path) as file:
         is_old = 0 in file.read(4)  # version 4 begins with numbers, later ones with text
-    variables = elements(path) if not is_old else [
-        Element(name, TEXT if kind == "char" else NUMBER_CLASSES[0], shape)
-        for name, shape, kind in whosmat(path, appendmat=False)
-    ]  # fmt: skip
-    reader = _Reader(log, Objects(path))
-    for variable in variables:
-        if variable.kind in NUMBER_CLASSES or variable.kind == SPARSE:
-            yield NamedArray(variable.name, Variable(path, variable.name, variable.shape))
-        elif variable.kind == FUNCTION:
-            log.warnings.append(f"{variable.name} is a function of MATLAB, which holds no samples, and is left out")
-        elif variable.kind == OPAQUE:
-            yield from reader.objects_of(variable)
-        else:
-            value = loadmat(path, appendmat=False, variable_names=[variable.name])[variable.name]
-            yield from reader.arrays(variable.name, value, MAX_DEPTH)
+        parts: list[tuple[str, Any]] = [("", path)] if is_old else varmats_from_mat(file)
+    reader = _Reader(log, Objects(None if is_old else next((part for name, part in parts if not name), None)))
+    for name, part in parts:
+        if name == OBJECT:
+            value = loadmat(part)[name]
+            name = value[0]["s0"].decode() if isinstance(value, MatlabOpaque) else name
+            yield from reader.arrays(name, value, MAX_DEPTH)
+        elif name or is_old:
+            yield from reader.variables(part)
 
 
 @dataclass
@@ -91,6 +78,7 @@ class Variable:
     """A variable of numbers, read completely at the first access and then kept."""
 
     path: Path
+    source: Any  # the file, or the bytes of this variable
     name: str
     shape: tuple[int, ...]
     kept: list[Any] = field(default_factory=list)
@@ -103,12 +91,16 @@ class Variable:
     def __getitem__(self, part: Any) -> Any:
         """Read a part of it."""
         if not self.kept:
-            self.kept.append(loadmat(self.path, appendmat=False, variable_names=[self.name])[self.name])
+            self.kept.append(_loaded(self.source, self.name))
         values = self.kept[0]
         values = values.toarray() if hasattr(values, "toarray") else values
         if np.iscomplexobj(values):
             raise BadLog(f"{self.path}: variable {self.name!r} holds complex numbers; save its parts")
         return values[part]
+
+
+def _loaded(source: Any, name: str) -> Any:
+    return loadmat(source, appendmat=False, variable_names=[name])[name]
 
 
 @dataclass(frozen=True)
@@ -118,10 +110,20 @@ class _Reader:
     log: Log
     objects: Objects
 
+    def variables(self, source: Any) -> Iterator[NamedArray]:
+        """List the arrays of variables; those of numbers are read later."""
+        for name, shape, kind in whosmat(source, appendmat=False):
+            if kind == "function":
+                self.log.warnings.append(f"{name} is a function of MATLAB, which holds no samples, and is left out")
+            elif kind in NESTED:
+                yield from self.arrays(name, _loaded(source, name), MAX_DEPTH)
+            else:
+                yield NamedArray(name, Variable(self.log.path, source, name, shape))
+
     def arrays(self, name: str, value: Any, deep: int) -> Iterator[NamedArray]:
         """List the arrays of a value."""
         if isinstance(value, MatlabOpaque):
-            yield from self._objects(name, value[0]["s2"], lambda: self.objects.read(value[0]["arr"]), deep)
+            yield from self._objects(name, value[0]["s2"].decode(), lambda: self.objects.read(value[0]["arr"]), deep)
         elif is_object(value):
             yield from self._objects(name, "", lambda: self.objects.read(value), deep)
         elif value is None:  # scipy's empty struct
@@ -140,11 +142,6 @@ class _Reader:
                     yield from self.arrays(key, inner, deep - 1)
         elif value.size:
             yield NamedArray(name, value)
-
-    def objects_of(self, variable: Element) -> Iterator[NamedArray]:
-        """List the arrays of a variable that holds objects."""
-        name, kind = variable.name, variable.class_name
-        yield from self._objects(name, kind, lambda: self.objects.of_element(variable), MAX_DEPTH)
 
     def _objects(self, name: str, kind: str, read: Callable[[], list[MatlabObject]], deep: int) -> Iterator[NamedArray]:
         """List the arrays of objects, or say why they cannot be read: their layout is not documented."""
