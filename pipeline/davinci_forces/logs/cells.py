@@ -154,21 +154,8 @@ def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence
         return parse_either(block, width, delimiter, wanted)
     except UNREADABLE:
         rows = [[cell.strip() for cell in row.split(delimiter)] for row in block.split(b"\n")[:-1]]
-    check(rows, wanted)
-    return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)
-
-
-def check(
-    rows: Sequence[Sequence[bytes]], wanted: Sequence[int], patterns: Sequence[re.Pattern[bytes]] | None = None
-) -> None:
-    """Check that wanted cells are numbers, or match the pattern of their column.
-
-    Raises
-    ------
-    NotANumber
-        At the first cell that does not.
-    """
     for i, row in enumerate(rows):
-        for column, pattern in zip(wanted, patterns or [NUMBER] * len(wanted), strict=True):
-            if row[column] and not pattern.fullmatch(row[column]) and row[column].decode("latin-1") not in MISSING:
+        for column in wanted:
+            if row[column] and not NUMBER.fullmatch(row[column]):
                 raise NotANumber(i, column, row[column])
+    return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)

@@ -7,12 +7,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, NotANumber, check, parse
+from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, parse
 from davinci_forces.logs.lines import GZIP, Lines, decode
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
-from davinci_forces.logs.text.dialect import Dialect, find_dialect
+from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
 from davinci_forces.logs.text.rows import (
     FRAME_BYTES,
@@ -20,15 +21,12 @@ from davinci_forces.logs.text.rows import (
     NUMBERS,
     Unclear,
     both_readings,
+    number_in,
     split_cells,
-    ungroup,
 )
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
+from davinci_forces.maths.arrays import Array
 
-VALUE_BYTES = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
-NUMBER_PATTERNS_BYTES = {
-    mark.decode(): re.compile(VALUE_BYTES.replace(b"MARK", re.escape(mark)), re.IGNORECASE) for mark in (b".", b",")
-}
 NAMES = {delimiter: name for name, delimiter in NAMED.items() if name != "\\t"}
 MAX_LISTED_LINES = 100  # lines between rows that are shown
 
@@ -174,36 +172,31 @@ class _Reading:
                 text = decode(row, "latin-1")
                 cells = split_cells(text, self.dialect.delimiter)
                 if self._is_row(line, text, cells):
-                    fitted = self._fitted(line, cells)
-                    rows.append([fitted[i].encode("latin-1") for i in self.wanted])
+                    rows.append(self._fitted(line, cells))
                     lines.append(line)
-        if not rows:
-            return Cells(0, {i: np.empty(0) for i in self.wanted}, dict.fromkeys(self.wanted, 0), texts=[])
-        all_wanted, patterns = range(len(self.wanted)), [self._pattern(i) for i in self.wanted]
+        by_column = {i: [row[i] for row in rows] for i in self.wanted}
+        nulls = {i: sum(cell in ABSENT for cell in cells) for i, cells in by_column.items()}
+        return Cells(
+            len(rows), {i: self._converted(i, lines, cells) for i, cells in by_column.items()}, nulls, texts=[]
+        )
+
+    def _converted(self, column: int, lines: Sequence[int], cells: Sequence[str]) -> Array:
+        """Convert the cells of a column, which stand in these lines, to numbers."""
+        is_number = NUMBERS[self.dialect.decimal].fullmatch
+        if column in self.times:
+            is_number = self.dialect.stamps[column].pattern.fullmatch
+        for line, cell in zip(lines, cells, strict=True):
+            if cell not in ABSENT and not is_number(cell):
+                raise BadLog(self._no_number(line, column, cell))
+        if column not in self.times:
+            return np.array([number_in(cell, self.dialect.decimal) for cell in cells])
         try:
-            check(rows, all_wanted, patterns)
-        except NotANumber:
-            rows = [[self._ungroup(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
-        try:
-            check(rows, all_wanted, patterns)
-        except NotANumber as bad:
-            raise BadLog(self._no_number(lines[bad.row], self.wanted[bad.column], bad.cell)) from None
-        content = b"".join(b"\t".join(row) + b"\n" for row in rows).replace(b"\n\n", b"\n \n")
-        times = {self.wanted.index(i): seconds for i, seconds in self.times.items()}
-        try:
-            decimal = self.dialect.decimal.encode()
-            parsed = parse(content, len(self.wanted), b"\t", decimal, all_wanted, times=times, missing=MISSING)
+            return self.times[column](pa.chunked_array([[None if c in ABSENT else c for c in cells]], pa.string()))
         except UNREADABLE as bad:
             raise BadLog(
                 f"{self.log.path}:{lines[0]}: from this line on there is a time that is not a valid date ({bad}); "
                 "correct the cell, or take the row out of the log"
             ) from None
-        columns = {self.wanted[i]: column for i, column in parsed.columns.items()}
-        return Cells(parsed.rows, columns, {self.wanted[i]: count for i, count in parsed.nulls.items()}, texts=[])
-
-    def _ungroup(self, column: int, cell: bytes) -> bytes:
-        text = cell.decode("latin-1")
-        return cell if column in self.times else ungroup(text, self.dialect.decimal).encode("latin-1")
 
     def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
         """Whether a line holds samples, and is neither a remark between rows nor the header again.
@@ -230,12 +223,6 @@ class _Reading:
             )
         return self.width == 1 and text not in self.dialect.header_lines
 
-    def _pattern(self, column: int) -> re.Pattern[bytes]:
-        """Return the pattern of the cells of a column."""
-        if column in self.times:
-            return re.compile(self.dialect.stamps[column].pattern.pattern.encode())
-        return NUMBER_PATTERNS_BYTES[self.dialect.decimal]
-
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """Fill up the cells of a row to the number of columns."""
         width, trailing = self.width, self.dialect.has_trailing
@@ -248,13 +235,13 @@ class _Reading:
             self.narrow, self.first_narrow = self.narrow + 1, self.first_narrow or line
         return cells + [""] * (width - len(cells))
 
-    def _no_number(self, line: int, column: int, cell: bytes) -> str:
+    def _no_number(self, line: int, column: int, cell: str) -> str:
         what, remedy = "time in the format of the rows before", "take the row out of the log"
         if column not in self.times:
             what = f"number with the decimal mark {self.dialect.decimal!r}"
             remedy = "set `decimal` for this log in study.toml"
-        where = f"{decode(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.channels[column].name})"
-        if readings := both_readings(cell.decode("latin-1")):
+        where = f"{decode(cell.encode('latin-1'), self.log.encoding)[:40]!r} in column {column} ({self.dialect.channels[column].name})"
+        if readings := both_readings(cell):
             return f"{self.log.path}:{line}: {where} {readings}"
         return f"{self.log.path}:{line}: {where} is not a {what}; correct the cell, or {remedy}"
 

@@ -34,11 +34,11 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def ungroup(cell: str, decimal: str) -> str:
-    """A number without thousands separators, if it has any."""
+def number_in(cell: str, decimal: str) -> float:
+    """The number in a cell with or without thousands separators; NaN where there is none."""
     if not NUMBERS[decimal].fullmatch(cell):
-        return cell
-    return re.sub(BLANK, "", cell).replace(".,".replace(decimal, ""), "")
+        return float("nan")
+    return float(re.sub(BLANK, "", cell).replace(".,".replace(decimal, ""), "").replace(decimal, "."))
 
 
 def both_readings(cell: str) -> str:
