@@ -182,14 +182,13 @@ class _Reading:
 
     def _converted(self, column: int, lines: Sequence[int], cells: Sequence[str]) -> Array:
         """Convert the cells of a column, which stand in these lines, to numbers."""
-        is_number = NUMBERS[self.dialect.decimal].fullmatch
-        if column in self.times:
-            is_number = self.dialect.stamps[column].pattern.fullmatch
+        decimal, is_time = self.dialect.decimal, column in self.times
+        is_one = self.dialect.stamps[column].pattern.fullmatch if is_time else NUMBERS[decimal].fullmatch
         for line, cell in zip(lines, cells, strict=True):
-            if cell not in ABSENT and not is_number(cell):
+            if cell not in ABSENT and not is_one(cell if is_time else cell.removesuffix(decimal)):
                 raise BadLog(self._no_number(line, column, cell))
-        if column not in self.times:
-            return np.array([number_in(cell, self.dialect.decimal) for cell in cells])
+        if not is_time:
+            return np.array([number_in(cell, decimal) for cell in cells])
         try:
             return self.times[column](pa.chunked_array([[None if c in ABSENT else c for c in cells]], pa.string()))
         except UNREADABLE as bad:
@@ -240,7 +239,8 @@ class _Reading:
         if column not in self.times:
             what = f"number with the decimal mark {self.dialect.decimal!r}"
             remedy = "set `decimal` for this log in study.toml"
-        where = f"{decode(cell.encode('latin-1'), self.log.encoding)[:40]!r} in column {column} ({self.dialect.channels[column].name})"
+        text = decode(cell.encode("latin-1"), self.log.encoding)[:40]
+        where = f"{text!r} in column {column} ({self.dialect.channels[column].name})"
         if readings := both_readings(cell):
             return f"{self.log.path}:{line}: {where} {readings}"
         return f"{self.log.path}:{line}: {where} is not a {what}; correct the cell, or {remedy}"

@@ -36,7 +36,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
 
 def number_in(cell: str, decimal: str) -> float:
     """The number in a cell with or without thousands separators; NaN where there is none."""
-    if not NUMBERS[decimal].fullmatch(cell):
+    if not NUMBERS[decimal].fullmatch(cell.removesuffix(decimal)):
         return float("nan")
     return float(re.sub(BLANK, "", cell).replace(".,".replace(decimal, ""), "").replace(decimal, "."))
 
