@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,27 +17,12 @@ MAX_FACTS = 40  # facts shown to the user
 NUMBER_KINDS = "biuf"  # kinds of numpy dtypes
 
 
-class Sliced(Protocol):
-    """An array that may stay on disk and is read by slices."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Lengths of its axes."""
-
-    @property
-    def dtype(self) -> Any:
-        """Type of its elements."""
-
-    def __getitem__(self, part: Any) -> Any:
-        """Read a part of it."""
-
-
 @dataclass(frozen=True)
 class NamedArray:
     """An array of a log: samples along its longest axis, quantities sampled together along the other."""
 
     name: str
-    data: Sliced
+    data: Any  # an array, or what stays on disk and is read by slices, with a shape and a dtype
     unit: str = ""
     time: str = ""  # the array of the same log with the sample times
 
@@ -50,12 +35,12 @@ class NamedArray:
     @property
     def rows(self) -> int:
         """Number of samples."""
-        return self.data.shape[self.axes[0]] if self.axes else 1
+        return int(self.data.shape[self.axes[0]]) if self.axes else 1
 
     @property
     def columns(self) -> int:
         """Number of quantities."""
-        return self.data.shape[self.axes[1]] if len(self.axes) > 1 else 1
+        return int(self.data.shape[self.axes[1]]) if len(self.axes) > 1 else 1
 
     @property
     def is_recording(self) -> bool:

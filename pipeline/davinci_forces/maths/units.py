@@ -51,6 +51,7 @@ UNSIZED = {
     "count", "cnt", "tick", "pulse", "inc", "lsb", "adc", "volt", "v", "mv", "percent", "pct", "permille", "%",
     "kg", "kgf", "gf", "g", "lbf", "lb", "inch", "inches", "kn", "knm", "ncm", "ua", "mdeg", "grad", "gon",
 }  # fmt: skip
+DATES = (9.4e8, 4.2e9)  # [s] since 1970, of the years 2000 to 2100
 TIME_WORDS = ("time", "t", "elapsed", "timestamp", "stamp", "clock", "duration")
 # words that are units only after these words: `time_min` is in minutes, but `q_min` is a minimum
 ONLY_AFTER = {
@@ -128,6 +129,11 @@ def _unit_at(words: list[str], i: int) -> str:
 def measures(unit: str) -> str | None:
     """The kind of quantity of a unit, or None for a unit that is not listed."""
     return UNITS.get(canonical(unit), (None, 0.0))[0]
+
+
+def since_1970(t: float) -> str:
+    """The unit in which a time since 1970 is a date of `DATES`: s, ms, us or ns; "" if it is none."""
+    return next((unit for unit in ("s", "ms", "us", "ns") if DATES[0] < t * size(unit) < DATES[1]), "")
 
 
 def size(unit: str) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals import columns
-from davinci_forces.maths.units import measures, size
+from davinci_forces.maths.units import measures, since_1970, size
 from davinci_forces.study.names import is_time
 
 MAX_SAMPLES = 200_000  # samples of a log that are read
@@ -19,7 +19,6 @@ MIN_CORRELATION = 0.9  # of a velocity with the slope of its position, to judge 
 TOLERANCE_RATE = 0.05  # relative; beyond it, and beyond the noise of the velocities, two rates disagree
 MIN_RISING_SHARE = 0.9  # of the steps of a time; recorders repeat some stamps
 MIN_RATE, MAX_RATE = 5.0, 20e3  # [Hz] of a robot's recorder, by which a time without a unit is judged
-YEARS = 946684800.0, 4102444800.0  # [s] since 1970 of the years 2000 and 2100
 SIZES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # [s]
 RATIOS = {("dq", "deg/s"): 180 / math.pi, ("q", "deg"): math.pi / 180}  # velocity over slope where one is in degrees
 
@@ -137,7 +136,7 @@ def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]],
     shape = "increases throughout" if strict.all() else "increases"
     if np.allclose(np.diff(t), 1.0, rtol=0, atol=1e-9 * abs(t[-1])) and not known and not (slope and slope.agrees(1.0)):
         return None  # a counter of samples
-    since = next((name for name, s in SIZES.items() if YEARS[0] < t[0] * s < YEARS[1]), "")
+    since = since_1970(t[0])
     sizes = [known] if known else [SIZES[since]] if since else []
     if not sizes and slope:
         sizes = [s for s in SIZES.values() if slope.agrees(1 / s)]

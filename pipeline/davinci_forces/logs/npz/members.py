@@ -17,7 +17,6 @@ from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 
 MAX_MEMBERS = 1000
-PIECE = 1 << 20  # [bytes] that are skipped at once
 
 
 def open_in_child(path: Path, options: Options) -> Log:
@@ -86,37 +85,29 @@ class Member:
     dtype: np.dtype[Any]
     by_column: bool  # stored column after column
     of_record: str = ""
-    pieces: list[Any] = field(default_factory=list)  # the opened file, and its next sample
+    opened: list[Any] = field(default_factory=list)  # the file, the type of its elements, and where they begin
+    whole: list[Any] = field(default_factory=list)  # all samples, once they had to be read
 
     def __getitem__(self, part: tuple[Any, ...]) -> Array:
-        """Read a part of it; samples before those read last are read again, and columns as a whole."""
-        rows_first = bool(part) and isinstance(part[0], slice) and part[0].stop is not None
-        if self.by_column or not rows_first:
-            if not self.pieces:
-                self.pieces.append(self._whole())
-            return np.asarray(self.pieces[0][part])
+        """Read a part of it; columns are read as a whole."""
+        if self.by_column or not (part and isinstance(part[0], slice) and part[0].stop is not None):
+            self.whole = self.whole or [self._samples(0, self.shape[0] if self.shape else 1)]
+            return np.asarray(self.whole[0][part])
         first, last, _ = part[0].indices(self.shape[0])
-        if not self.pieces or self.pieces[1] > first:
-            self.pieces[:] = [_opened(self.path, self.name), 0, None]
-            self.pieces[2] = _header(self.pieces[0])[2]
-        file, at, stored = self.pieces
+        return np.asarray(self._samples(first, last)[(slice(None), *part[1:])])
+
+    def _samples(self, first: int, last: int) -> Any:
+        if not self.opened:
+            file = _opened(self.path, self.name)
+            self.opened += [file, _header(file)[2], file.tell()]
+        file, stored, begin = self.opened
         width = math.prod(self.shape[1:]) * stored.itemsize
-        _skip(file, (first - at) * width)
-        values = np.frombuffer(_exactly(file, (last - first) * width), stored).reshape(last - first, *self.shape[1:])
-        self.pieces[1] = last
-        return np.asarray((values[self.of_record] if self.of_record else values)[(slice(None), *part[1:])])
-
-    def _whole(self) -> Any:
-        with _opened(self.path, self.name) as file:
-            shape, by_column, dtype = _header(file)
-            content = _exactly(file, math.prod(shape) * dtype.itemsize)
-        values = np.frombuffer(content, dtype).reshape(shape, order="F" if by_column else "C")
+        file.seek(begin + first * width)
+        values = np.frombuffer(_exactly(file, (last - first) * width), stored)
+        values = values.reshape(
+            (last - first, *self.shape[1:])[: len(self.shape)], order="F" if self.by_column else "C"
+        )
         return values[self.of_record] if self.of_record else values
-
-
-def _skip(file: IO[bytes], count: int) -> None:
-    while count > 0:
-        count -= len(_exactly(file, min(count, PIECE)))
 
 
 def _exactly(file: IO[bytes], count: int) -> bytes:

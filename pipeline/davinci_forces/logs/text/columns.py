@@ -8,9 +8,9 @@ import numpy as np
 from davinci_forces.logs.cells import MISSING
 from davinci_forces.logs.text.rows import NUMBERS, both_readings
 from davinci_forces.logs.text.stamps import both_dates
+from davinci_forces.maths.units import since_1970
 
-DATES = (9.4e8, 4.2e9)  # [s] since 1970, of the years 2000 to 2100
-DAYS = ((36525, 73051), (730486, 767011))  # of the same years, as Excel and MATLAB count them
+DAYS = ((36525, 73051), (730486, 767011))  # of the years 2000 to 2100, as Excel and MATLAB count them
 COUNTED_CELLS = 50  # from which a date as a count is recognised
 STEP_IN_DAYS = 2e-5  # a shorter sampling time is 1.7 s in days; in seconds, no robot samples so fast
 TICKS = ((1.25e17, 1.6e17), (6.3e17, 6.7e17))  # of 100 ns in the same years, as Windows and .NET count them
@@ -32,9 +32,8 @@ def counted_unit(cells: Sequence[str]) -> str:
     if not len(x):
         return ""
     low, high = float(x.min()), float(x.max())
-    for unit, size in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-        if DATES[0] < low * size and high * size < DATES[1]:
-            return unit
+    if (unit := since_1970(low)) not in ("", "s") and unit == since_1970(high):
+        return unit
     if any(first < low and high < last for first, last in TICKS):
         return "100 ns"
     if len(x) < 3 or not any(first < low and high < last for first, last in DAYS):

@@ -1,6 +1,5 @@
 """Find the time channels of the channels that a study uses, and compute their times in seconds."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -11,10 +10,12 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import Alignment, Follower, TimedBlock, align
 from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.units import since_1970
+from davinci_forces.maths.units import size as size_of
 from davinci_forces.study import LogEntry, Source
 from davinci_forces.study.intake.missing import MissingSamples, split_by_rhythm, without_empty_rows
 
-MAX_SECONDS = 1e11  # [s] a later time since 1970 than the year 5138 is in a smaller unit
+MAX_SECONDS = 1e11  # [s] a later time since 1970 is in a smaller unit
 ALIGNED = ""  # name in a block of the times of channels that were resampled on one clock [s]
 
 
@@ -192,14 +193,14 @@ class UsedClocks:
         """
         if name not in self.units and len(t):
             size = float(np.median(np.abs(t)))
-            power = 3 * math.ceil(math.log10(size / MAX_SECONDS) / 3) if MAX_SECONDS < size < np.inf else 0
+            unit = since_1970(size) if MAX_SECONDS < size < np.inf else "s"
             stated = self.log.find(name).unit or (self.time_source.unit if self.time_source else "")
-            if power > 9 or (power and stated):
+            if not unit or (unit != "s" and stated):
                 raise BadLog(
                     f"{self.log.path}: channel {name!r} holds times of {size:.4g} s, which is no date; correct the "
                     "unit of time in study.toml, or name another time channel"
                 )
-            self.units[name] = 10.0**-power
+            self.units[name] = size_of(unit)
         return self.units.get(name, 1.0)
 
     def note(self) -> Iterator[str]:
