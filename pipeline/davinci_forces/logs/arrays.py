@@ -69,9 +69,7 @@ class ArrayLog(Log):
 
     of: dict[str, tuple[NamedArray, int]] = field(default_factory=dict)  # by channel: its array and column
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         of = {name: self.of[name] for name in names}
         arrays = {id(array): array for array, _ in of.values()}
         rows = max((array.rows for array in arrays.values()), default=0)

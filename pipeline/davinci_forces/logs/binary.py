@@ -70,9 +70,7 @@ class BinaryLog(Log):
     dtype: np.dtype[np.generic] = field(default_factory=lambda: np.dtype(">f8"))
     pieces: list[tuple[int, int]] = field(default_factory=list)  # position and rows of each
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names)
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         yield from read_ahead(self._blocks(names))
 
     def _blocks(self, names: Sequence[str]) -> Iterator[Block]:

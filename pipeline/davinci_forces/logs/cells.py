@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 
-Number = TypeVar("Number", np.float64, np.int64)
+Number = TypeVar("Number", np.float64, np.int64, np.uint8)
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 UNREADABLE = pa.ArrowInvalid
@@ -36,22 +36,13 @@ def integers(column: pa.ChunkedArray) -> Integers:
 
 def absent(column: pa.ChunkedArray) -> Booleans:
     """Mask (N,) of the rows in which a column has no value."""
-    return ~np.concatenate([_present(chunk) for chunk in column.chunks] or [np.empty(0, bool)])
+    return _values(column.is_null().cast(pa.uint8()), np.uint8).view(bool)
 
 
 def _values(column: pa.ChunkedArray, dtype: type[Number]) -> NDArray[Number]:
     chunks = ((chunk, np.frombuffer(chunk.buffers()[1] or b"", dtype)) for chunk in column.chunks)
     parts = [values[chunk.offset : chunk.offset + len(chunk)] for chunk, values in chunks]
     return np.concatenate(parts or [np.empty(0, dtype)])
-
-
-def _present(chunk: pa.Array) -> Booleans:
-    """Mask of the rows in which a chunk has a value: one bit each, the lowest for the first."""
-    bits = chunk.buffers()[0] if chunk.null_count else None
-    if bits is None:
-        return np.full(len(chunk), not chunk.null_count)
-    all_bits = np.unpackbits(np.frombuffer(bits, np.uint8), bitorder="little")
-    return all_bits[chunk.offset : chunk.offset + len(chunk)].view(bool)
 
 
 class NotANumber(ValueError):

@@ -14,8 +14,8 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Channel, Log, Options, unique
-from davinci_forces.logs.parts import ABSOLUTE, SAMPLED_KINDS, require_different, starts_of
+from davinci_forces.logs.log import SAMPLED_KINDS, UNIT_OF_COUNTS, Block, Channel, Log, Options, unique
+from davinci_forces.logs.parts import ABSOLUTE, require_different, starts_of
 from davinci_forces.logs.timeline import SKEW
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.clock import (
@@ -104,9 +104,8 @@ class Joined(Log):
         twin.parts = {stem: part.independent_copy() for stem, part in self.parts.items()}
         return twin
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read channels of one clock, which are therefore of one file."""
-        self._restart(names, kinds=SAMPLED_KINDS)
         self.warnings[:] = self.remarks
         stem = self.of[names[0]]
         part = self.parts[stem]

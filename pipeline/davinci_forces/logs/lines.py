@@ -90,6 +90,11 @@ class Lines:
             line += block.lines
         self.cut, self.cut_at = remainder, line
 
+    def remarks(self) -> list[str]:
+        """Say what is wrong with the end of the file, once `blocks` has ended."""
+        nuls = f"{self.padding} NUL bytes at the end of the file, typical of a power cut, are not read"
+        return [nuls] * bool(self.padding) + [self.damage] * bool(self.damage)
+
     def _bytes(self, size: int) -> Iterator[bytes]:
         with open_file(self.path) as file:
             pieces = iter(lambda: file.read(size), b"")

@@ -14,7 +14,6 @@ To read several clocks at once, use `Log.independent_copy`, which is shallow; `b
 own pass.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
@@ -31,6 +30,7 @@ from davinci_forces.maths.units import unit_in as unit_in
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples
+SAMPLED_KINDS = ("number", "time")  # kinds of channels that are read
 BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
@@ -68,7 +68,7 @@ class Clock:
 
 
 @dataclass
-class Log(ABC):
+class Log:
     """An opened log.
 
     `warnings`, `facts`, `comments` and the counts grow while its blocks are read and are complete at their end.
@@ -95,7 +95,6 @@ class Log(ABC):
     )
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
 
-    @abstractmethod
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
 
@@ -107,6 +106,12 @@ class Log(ABC):
         BadLog
             If damage makes the rest of the file unreadable; names the file, line and column.
         """
+        self._restart(names)
+        yield from self._read(names)
+
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples of channels of one clock that hold numbers or times."""
+        raise NotImplementedError
 
     def find(self, name: str | int) -> Channel:
         """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
@@ -176,7 +181,7 @@ class Log(ABC):
             raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
         return written[number]
 
-    def _restart(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
+    def _restart(self, names: Sequence[str]) -> None:
         """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0
@@ -184,7 +189,7 @@ class Log(ABC):
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
         for name in names:
             channel = self._looked_up[name][0] if name in self._looked_up else self.find(name)
-            if channel.kind not in kinds:
+            if channel.kind not in SAMPLED_KINDS:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
         if len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")

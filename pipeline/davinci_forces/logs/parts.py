@@ -11,14 +11,13 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, unique
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
 
 UNSET_START = datetime(1904, 1, 1)  # LabVIEW's zero, which it writes for an unknown start
 ABSOLUTE = 1e9  # [s] a larger time counts from a fixed year, not from the start of its part
-SAMPLED_KINDS = ("number", "time")
 
 
 def open_parts(files: Sequence[Path], options: Options) -> Log:
@@ -108,7 +107,7 @@ class Parts(Log):
         twin.parts = [part.independent_copy() for part in self.parts]
         return twin
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the parts in order and collect their warnings, comments and counts.
 
         Raises
@@ -116,7 +115,6 @@ class Parts(Log):
         BadLog
             If a part begins before its predecessor has ended.
         """
-        self._restart(names, kinds=SAMPLED_KINDS)
         self.warnings[:] = self.remarks
         time = next((time for time in names if time in self.times), "")
         axis = _Axis(self.parts, self.starts)

@@ -123,9 +123,7 @@ class ArrowLog(Log):
     columns: dict[str, tuple[str, int | None]] = field(default_factory=dict)  # by channel; with the place in lists
     origin: int = 0  # [s] since 1970; the zero of time stamps
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         episodes = _Episodes() if self.time == EPISODES[0] and self.time in names else None
         needed = {self.columns[name][0] for name in (*names, *(EPISODES if episodes else ()))}
         sizes = Counter(column for column, place in self.columns.values() if place is not None)

@@ -64,9 +64,7 @@ class IsolatedLog(Log):
 
     request: Message = field(default_factory=dict)
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         yield from read_ahead(self._blocks(list(names)))
 
     def _blocks(self, names: list[str]) -> Iterator[Block]:

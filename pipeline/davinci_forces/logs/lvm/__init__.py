@@ -127,11 +127,7 @@ class LvmLog(Log):
     options: Options = field(default_factory=Options)
     clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says.
-
-        If channels have several clocks, rows without a sample on this clock are skipped.
-        """
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the rows with a sample on the clock of these channels."""
         [clock] = self.by_clock(names) or [""]
         yield from read_ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())

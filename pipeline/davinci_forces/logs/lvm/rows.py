@@ -240,10 +240,8 @@ class Reading:
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         elif lines.cut:
             say(f"line {lines.cut_at}: the file ends within this line, which is not used")
-        if lines.padding:
-            say(f"{lines.padding} NUL bytes at the end of the file, typical of a power cut, are not read")
-        if lines.damage:
-            say(lines.damage)
+        for remark in lines.remarks():
+            say(remark)
         say.close()
 
 

@@ -169,9 +169,7 @@ class BagLog(Log):
     topics: list[Topic] = field(default_factory=list)
     origin: int = 0  # [ns] since 1970
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, all of one topic, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         if not names:
             return
         assert self.bag

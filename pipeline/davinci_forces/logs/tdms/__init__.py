@@ -95,12 +95,8 @@ class TdmsLog(Log):
     mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel mean two things
     _paths: dict[str, str] = field(default_factory=dict)  # by name
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says.
-
-        Shorter channels are filled up with NaN.
-        """
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples; shorter channels are filled up with NaN."""
         if problem := next((self.mixed[name] for name in names if name in self.mixed), ""):
             raise BadLog(f"{self.path}: {problem}")
         yield from read_ahead(self._timed(names))

@@ -80,7 +80,7 @@ class TextLog(Log):
         for i, why in self.dialect.unread.items():
             if (name := self.dialect.channels[i].name) in names:
                 raise BadLog(f"{self.path}: column {i} ({name}) {why}")
-        self._restart(names, kinds=("number", "time"))
+        self._restart(names)
         yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
 
@@ -263,7 +263,5 @@ class _Reading:
             ended = datetime.fromisoformat(self.log.started) + timedelta(seconds=self.latest)
             if clocks_may_change(self.log.started, ended.isoformat()):
                 say(f"the log began at {self.log.started} and ended at {ended.isoformat()}: {REMARK}")
-        if lines.padding:
-            say(f"{lines.padding} NUL bytes at the end of the file, typical of a power cut, are not read")
-        if lines.damage:
-            say(lines.damage)
+        for remark in lines.remarks():
+            say(remark)

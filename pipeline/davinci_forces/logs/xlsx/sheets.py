@@ -100,9 +100,7 @@ class SheetLog(Log):
     skipped: int = 0  # rows above the samples
     origin: datetime = datetime.min
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         waiting: list[list[float]] = []
         empty: list[list[bool]] = []
