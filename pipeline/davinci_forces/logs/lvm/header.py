@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 
@@ -134,15 +134,6 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
         step_written=written, sampled=_sampled(tags, measured, len(names), start, file), remarks=tuple(remarks),
         notes=notes,
     )  # fmt: skip
-
-
-def with_date(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None) -> Layout:
-    """Derive the layout of a file segment whose header differs only in its date."""
-    tags = _tags([text for text in lines if text[:4] in (b"Date", b"Time")], like.file.separator.decode(), encoding)
-    start, started = _started(tags, like.file)
-    starts = _starts(tags, len(like.names), start)
-    sampled = (s and replace(s, start=column_start) for s, column_start in zip(like.sampled, starts, strict=True))
-    return replace(like, line=line, start=start, started=started, sampled=tuple(sampled))
 
 
 def _sampled(

@@ -13,7 +13,7 @@ import numpy as np
 
 from davinci_forces.logs.cells import NUMBER
 from davinci_forces.logs.lines import Block
-from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, file_header, layout, with_date
+from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, file_header, layout
 from davinci_forces.logs.timeline import refine_groups
 
 WRITTEN = re.compile(rb"-?\d+[.,]\d+(E[+-]?\d+)?|NaN|-?Inf")  # as LabVIEW writes a number: always with a fraction
@@ -81,7 +81,6 @@ class Walk:
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
     _done: list[Run] = field(default_factory=list)
-    _like: tuple[bytes, ...] = ()  # the header of the previous file segment, without its date
 
     def runs(self, block: Block, take: Callable[[Run, int], Taken | None]) -> Iterator[tuple[Run, Taken | None]]:
         """Split a block of complete lines into runs of rows.
@@ -180,7 +179,7 @@ class Walk:
     def _columns(self, line: bytes) -> str:
         if self._rowless and self.layout:
             self.say(f"line {self.layout.line}: the file segment whose header ends here holds no rows")
-        self.layout = self._parsed(line)
+        self.layout = layout(self._header, line, self.file, self.line, self.encoding)
         self._header, self._begins, self._width, self._rowless = [], True, self.layout.width, True
         sampled = self.layout.sampling
         if self.layout.names not in self.met or len({*sampled.values()}) > 1:
@@ -190,14 +189,6 @@ class Walk:
         for remark in self.layout.remarks:
             self.say(remark)
         return "row"
-
-    def _parsed(self, columns: bytes) -> Layout:
-        """Return the layout of the header; it is parsed only if more than the date differs from the header before."""
-        like = (columns, *(line for line in self._header if not line.startswith((b"Date", b"Time"))))
-        before, self._like = self._like, like
-        if self.layout and like == before and self.layout.file is self.file and not self.layout.remarks:
-            return with_date(self.layout, self._header, self.line, self.encoding)
-        return layout(self._header, columns, self.file, self.line, self.encoding)
 
     def _row(self, line: bytes) -> str:
         assert self.layout is not None
