@@ -27,7 +27,7 @@ PAGES = slice(28, 32)  # bytes of a database's header with the number of pages
 PAGE = slice(16, 18)  # and with the size of a page
 TABLES = ("topics", "message_definitions", "messages")
 # The first message of each topic and size, in half the time of GROUP BY, which sorts all messages.
-SIZES = """
+MESSAGE_SIZES = """
     CREATE TEMP TABLE sizes (topic, size, timestamp, id, count, PRIMARY KEY (topic, size)) WITHOUT ROWID;
     INSERT INTO sizes SELECT topic_id, length(data), timestamp, id, 1 FROM messages NOT INDEXED WHERE true
     ON CONFLICT DO UPDATE SET count = count + 1, timestamp = min(timestamp, excluded.timestamp),
@@ -99,7 +99,7 @@ class Database:
         if self.base.execute("SELECT name FROM sqlite_master WHERE name = 'message_definitions'").fetchall():
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
             definitions = {kind: (encoding, text) for kind, encoding, text in self.base.execute(query)}
-        self.base.executescript(SIZES)
+        self.base.executescript(MESSAGE_SIZES)
         for number, *size in self.base.execute("SELECT topic, timestamp, id, size, count FROM sizes"):
             self.sizes.setdefault(number, []).append(size)
         for number, topic, kind, serialization in self.base.execute(

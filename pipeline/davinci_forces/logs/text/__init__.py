@@ -183,9 +183,9 @@ class _Reading:
     def _converted(self, column: int, lines: Sequence[int], cells: Sequence[str]) -> Array:
         """Convert the cells of a column, which stand in these lines, to numbers."""
         decimal, is_time = self.dialect.decimal, column in self.times
-        is_one = self.dialect.stamps[column].pattern.fullmatch if is_time else NUMBERS[decimal].fullmatch
+        matches = self.dialect.stamps[column].pattern.fullmatch if is_time else NUMBERS[decimal].fullmatch
         for line, cell in zip(lines, cells, strict=True):
-            if cell not in ABSENT and not is_one(cell if is_time else cell.removesuffix(decimal)):
+            if cell not in ABSENT and not matches(cell if is_time else cell.removesuffix(decimal)):
                 raise BadLog(self._no_number(line, column, cell))
         if not is_time:
             return np.array([number_in(cell, decimal) for cell in cells])
