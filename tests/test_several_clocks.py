@@ -47,7 +47,9 @@ def test_a_parabola_comes_through_exactly_whatever_the_clocks_the_blocks_and_the
 ) -> None:
     t, their_t = np.cumsum(own), np.cumsum(theirs) + 0.5
     their_t[gap:] += 5.0
-    assume(np.median(np.diff(t)) < MIN_RATIO_FILTERED * np.median(np.diff(their_t)))  # one that is faster is averaged first
+    assume(
+        np.median(np.diff(t)) < MIN_RATIO_FILTERED * np.median(np.diff(their_t))
+    )  # one that is faster is averaged first
     x = 1 + 2 * their_t - 0.3 * their_t**2
     try:
         whole, all_of_it, _ = put_on(t, their_t, x)
