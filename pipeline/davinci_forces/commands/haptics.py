@@ -58,20 +58,24 @@ def _write_template(file: Path) -> None:
 
 def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
     """Results of a scenario as JSON values; None stands for no limit."""
+    from davinci_forces.haptics import limits
     from davinci_forces.haptics import loop as haptic
 
-    response = haptic.response(scenario)
+    response, loop = haptic.response(scenario), limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:
-        run, margins = haptic.experiment(scenario, hand), haptic.margins(scenario, hand, response)
+        run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, hand, loop)._asdict()
         if csv is not None:
             _write_csv(csv / f"{name}.csv", run)
         hands[name] = {
-            "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": float(run.true.max()),
-            "felt_peak": float(run.felt.max()), "felt_error": run.error,
-            "out_of_reach": float(run.t[-1]) if run.thrown else None, "k_t_settles": _known(margins.stiffness),
-            "k_t_response": _known(margins.by_response), "delay_margin": _known(margins.delay),
-        }  # fmt: skip
+            "m": hand.m,
+            "b_h": hand.b,
+            "k_h": hand.k,
+            "true_peak": float(run.true.max()),
+            "felt_peak": float(run.felt.max()),
+            "felt_error": run.error,
+            "out_of_reach": float(run.t[-1]) if run.thrown else None,
+        } | {key: _known(value) for key, value in found.items() if isinstance(value, float)}
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}
@@ -107,12 +111,17 @@ def _format_text(answer: Answer) -> str:
         lines += [
             f"  peak force: felt {hand['felt_peak']:.3g} N, true {hand['true_peak']:.3g} N; error of the felt force "
             f"{hand['felt_error']:.2g} N (rms)",
-            f"  stable against tissue up to {_quantity(hand['k_t_settles'], 'N/m')} in simulation, up to "
-            f"{_quantity(hand['k_t_response'], 'N/m')} by the frequency response",
-            f"  delay margin: {_quantity(hand['delay_margin'], 's')}",
+            f"  limit for elastic tissue: {_quantity(hand['k_t_limit'], 'N/m')} by the formula, with the force "
+            f"{_quantity(hand['loop_delay'], 's')} late; {_quantity(hand['k_t_response'], 'N/m')} by the response, "
+            f"{_quantity(hand['k_t_simulated'], 'N/m')} in simulation",
+            f"  with the arm's friction and damping of tissue: {_quantity(hand['k_t_settles'], 'N/m')} in simulation",
+            f"  {_quantity(hand['k_t_best'], 'N/m')} with the best additional delay, {hand['best_delay'] or 0:.3g} s; "
+            f"against this tissue the response asks for a damping of {hand['damping_needed']:.3g} N s/m; no setting is "
+            "changed",
+            f"  additional delay until unstable: {_quantity(hand['delay_margin'], 's')}",
         ]
     return "\n".join(lines)
 
 
 def _quantity(value: float | None, unit: str) -> str:
-    return f"any [{unit}]" if value is None else f"{value:.3g} {unit}"
+    return "not found" if value is None else f"{value:.3g} {unit}"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from davinci_forces.haptics.maths.bimodal import Hand
 
 Limits = dict[str, float | None]
+TRIED_DELAYS = 101
 
 
 def run(
@@ -67,9 +68,11 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
 
 
 def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
-    """Limits of K_T [N/m] by each criterion; None stands for no limit."""
+    """Limits of K_T [N/m] by each criterion, and the delay with the largest; None stands for no limit."""
+    import numpy as np
+
     from davinci_forces.haptics.maths import bimodal, lmi
-    from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
+    from davinci_forces.haptics.maths.delay import best_delay, delay_limit, sampled_limit
 
     switching = bimodal.switching_limit(hand)
     limits: Limits = {
@@ -77,17 +80,25 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
         "k_t_lmi": lmi.lmi_limit(hand, switching),
         "k_t_switching": switching,
     }
-    if rate is not None:
-        limits["k_t_delay"] = sampled_limit(hand, delay or 0.0, rate)
-    elif delay is not None:
-        limits["k_t_delay"] = delay_limit(hand, delay) if delay else None
+    if delay is None and rate is None:
+        return limits
+
+    def limit(late: float) -> float:
+        return delay_limit(hand, late) if rate is None else sampled_limit(hand, late, rate)
+
+    now = delay or 0.0
+    limits["k_t_delay"] = limit(now) if now or rate else None
+    if limits["k_t_delay"] is not None:
+        tried = now + np.linspace(0.0, 2.0 * np.pi / hand.frequency, TRIED_DELAYS)
+        best = best_delay(tried, np.array([limit(late) for late in tried.tolist()]))
+        limits |= dict(zip(("best_delay", "k_t_best"), best, strict=True))
     return limits
 
 
 def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float | None) -> str:
     """The limits as text, one line each."""
     from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE
-    from davinci_forces.haptics.maths.delay import damping_needed
+    from davinci_forces.haptics.maths.delay import damping_needed, delay_limit
 
     lines = [
         f"Limits of the tissue stiffness K_T for a hand of m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and "
@@ -97,37 +108,29 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
         f"  k_t_lmi       {_newtons(limits['k_t_lmi'])}  the same, computed from the matrix inequality (8.10)",
         f"  k_t_switching {_newtons(limits['k_t_switching'])}  below it, every switching is stable; above it, the "
         "worst switching is not",
-        "  without delay          any  switching at contact only, as it really does: stable for every K_T >= 0",
     ]
-    if "k_t_delay" in limits:
-        how = [f"delayed by {delay:g} s"] if delay else []
-        how += [f"held at {rate:g} Hz"] if rate is not None else []
+    limit = limits.get("k_t_delay")
+    if limit is None:
+        return "\n".join([*lines, "", "These know no delay, which limits a real hand: add --delay or --rate."])
+    how = [f"delayed by {delay:g} s"] if delay else []
+    how += [f"held at {rate:g} Hz"] if rate is not None else []
+    lines += [
+        f"  k_t_delay     {_newtons(limit)}  below it, a hand that stays in contact is stable, with the force "
+        f"{' and '.join(how)}",
+        f"The first three allow any switching and know no delay; k_t_delay is the limit with delay. It is largest, "
+        f"{limits['k_t_best']:.4g} N/m ({limits['k_t_best'] / limit:.3g} times), at a delay of "  # type: ignore[operator]
+        f"{limits['best_delay']:.3g} s, of those up to a period of the free hand longer. No setting is changed.",
+    ]
+    if limit <= THESIS_TISSUE:
+        total = (delay or 0.0) + (0.5 / rate if rate else 0.0)
+        damping = damping_needed(hand, THESIS_TISSUE, lambda damped: delay_limit(damped, total))
         lines += [
-            f"  k_t_delay     {_newtons(limits['k_t_delay'])}  below it, a hand that stays in contact is stable, with "
-            f"the force {' and '.join(how) or 'not delayed'}"
+            f"The tissue of the thesis, {THESIS_TISSUE:g} N/m, needs a hand with a damping of {damping:.3g} N s/m."
         ]
-    lines += ["", f"The tissue of the thesis, {THESIS_TISSUE:g} N/m, is {_place(limits, THESIS_TISSUE)}."]
-    if delay and (limits.get("k_t_delay") or THESIS_TISSUE) <= THESIS_TISSUE:
-        damping = damping_needed(hand, THESIS_TISSUE, delay + (0.5 / rate if rate else 0.0))
-        lines += [f"A hand with a damping of about {damping:.3g} N s/m would be stable."]
+    else:
+        lines += [f"With this delay, the hand is stable against the tissue of the thesis, {THESIS_TISSUE:g} N/m."]
     return "\n".join(lines)
 
 
 def _newtons(value: float | None) -> str:
-    return f"{'any' if value is None else f'{value:.4g} N/m':>12}"
-
-
-def _place(limits: Limits, k_t: float) -> str:
-    """Where a stiffness lies among the limits."""
-    cqlf, switching, delayed = (limits.get(name) for name in ("k_t_cqlf", "k_t_switching", "k_t_delay"))
-    if k_t < (cqlf or 0.0):
-        text = "below all limits without delay"
-    elif k_t < (switching or 0.0):
-        text = "above k_t_cqlf, but stable under every switching"
-    else:
-        text = "above both limits of arbitrary switching, which does not occur: without delay it is stable"
-    if "k_t_delay" not in limits:
-        return text + "; add --delay or --rate to compute the limit by delay"
-    if delayed is None or k_t < delayed:
-        return text + "; with this delay it is stable, too"
-    return text + "; with this delay it is unstable: it is above k_t_delay"
+    return f"{value:.4g} N/m".rjust(12)

@@ -1,4 +1,4 @@
-"""The haptic loop of a scenario: the force that a hand feels through the arm, and the stability margins of the loop.
+"""The haptic loop of a scenario: the force that a hand feels through the arm, and its response to the hand's motion.
 
 The filter in the loop is the filter that tracks the logs; it takes one sample at a time.
 """
@@ -14,7 +14,7 @@ from davinci_forces.filters import ekf, stepping
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
-from davinci_forces.haptics.maths.delay import Complex, harmonic, max_stable, response_limit, settles, zero_order_hold
+from davinci_forces.haptics.maths.delay import Complex, harmonic, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array
@@ -29,18 +29,9 @@ RISE_TIME, RELEASE_TIME = (
     3.0,
 )  # [s] when the force has risen to steady force plus share, and when the share is released
 SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visible
-FREQUENCIES = np.geomspace(0.2, 12.0, 14)  # [Hz] of the frequency response
+FREQUENCIES = np.geomspace(0.2, 12.0, 28)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
 TRANSIENT, MIN_WATCH = 2.0, 2.0  # [s] initial time that is not evaluated, and least evaluated time
-MAX_DELAY_MARGIN = 1.0  # [s]
-
-
-class Margins(NamedTuple):
-    """Stability margins of a hand; NaN where no limit was found."""
-
-    stiffness: float  # [N/m] largest K_T with which the hand settles, by simulation
-    by_response: float  # [N/m] the same limit from the frequency response of the loop
-    delay: float  # [s] largest additional delay of the force with which the hand settles; 0 if it never settles
 
 
 class FeltResponse(NamedTuple):
@@ -105,31 +96,13 @@ def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
     return settles(run.x[t >= RELEASE_TIME], EXTRA_SHARE * PRESS_FORCE / (hand.k + gain * _parts(scenario)[0]))
 
 
-def margins(scenario: HapticScenario, hand: Hand, response: FeltResponse) -> Margins:
-    """Compute the limits of stiffness and of delay; each changes only one value of the scenario."""
-    stiffness, _ = _parts(scenario)
-    gain = scenario.device.force * scenario.device.motion
-    w = 2.0 * np.pi * response.frequency
-    by_response = response_limit(hand, w, response.T, gain * scenario.damping) / gain if gain else math.nan
-
-    def settles_against(k_t: float) -> bool:
-        return hand_settles(replace(scenario, stiffness=k_t), hand)
-
-    def settles_with(delay: float) -> bool:
-        return hand_settles(replace(scenario, force_delay=scenario.force_delay + delay), hand)
-
-    limit = max_stable(settles_against, by_response if math.isfinite(by_response) else stiffness)
-    delay = max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if settles_against(stiffness) else 0.0
-    return Margins(limit, by_response, delay)
-
-
 def response(scenario: HapticScenario) -> FeltResponse:
     """Compute the response of the felt force to a hand that moves in the tissue, without noise."""
-    return FeltResponse(FREQUENCIES, np.array([_answer(scenario, f) for f in FREQUENCIES.tolist()]))
+    return FeltResponse(FREQUENCIES, np.array([felt_share(scenario, f) for f in FREQUENCIES.tolist()]))
 
 
-def _answer(scenario: HapticScenario, frequency: float) -> complex:
-    """T at one frequency [Hz]."""
+def felt_share(scenario: HapticScenario, frequency: float) -> complex:
+    """T at one frequency [Hz]: the felt force over the force that the tissue would exert at the hand's position."""
     w, stiffness = 2.0 * math.pi * frequency, _parts(scenario)[0]
     turns = math.ceil(MIN_WATCH * frequency)
     ticks = round((TRANSIENT + turns / frequency) / scenario.tick)

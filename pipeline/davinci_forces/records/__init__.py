@@ -51,7 +51,7 @@ from davinci_forces.records.recordings import (
 )
 from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, SensorForce, TipBudget, TipContact, TipForce
 from davinci_forces.records.tissue import (
-    DelayLimit,
+    HandLimit,
     HapticMotion,
     HapticResponse,
     HapticRun,
@@ -59,7 +59,6 @@ from davinci_forces.records.tissue import (
     StabilityLimit,
     StabilityMap,
     Stiffness,
-    TissueLimit,
     TissueModel,
 )
 from davinci_forces.records.weight import FreeWeight, Load, Weight
@@ -67,15 +66,14 @@ from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
-    "Control", "Counts", "CrossFit", "DelayLimit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
-    "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
-    "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel",
-    "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin",
-    "PathShare",
+    "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "Explanation", "FilterNoise", "Fit",
+    "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "HandLimit", "HapticMotion",
+    "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel", "Labels", "Links",
+    "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin", "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
-    "TipForce", "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
-    "Workspace", "diagnostic",
+    "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
+    "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -86,7 +84,7 @@ KINDS: dict[str, type[Record]] = {
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
         FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
+        Comparison, StabilityMap, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

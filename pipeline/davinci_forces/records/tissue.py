@@ -128,42 +128,44 @@ class StabilityLimit(RobotRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class DelayLimit(RobotRecord):
-    """The largest stable tissue stiffness for one hand, over the delay of the force."""
+class HandLimit(Record):
+    """The largest stable tissue stiffness of one hand: the headline, its checks, and the best additional delay."""
 
-    UNKNOWN = ("k_t_leaving",)
+    KEY = ("hand",)
+    UNKNOWN = ("k_t_delay",)
 
+    hand: str
     hand_mass: float
     hand_damping: float
     hand_stiffness: float
     link_rate: float
+    k_t_limit: float
+    k_t_limit_std: float
+    k_t_response: float
+    k_t_simulated: float
+    k_t_settles: float
     k_t_cqlf: float
     k_t_switching: float
+    limit_frequency: float
+    filter_lag: float
+    filter_lag_std: float
+    filter_share: float
+    filter_share_std: float
+    loop_delay: float
+    felt_damping: float
+    best_delay: float
+    k_t_best: float
+    damping_needed: float
+    delay_margin: float
     delay: Column
     k_t_delay: Column
-    k_t_held: Column
-    k_t_leaving: Column
 
     def published(self) -> Iterator[Published]:
-        """The hand, and its limits without delay."""
-        names = ("hand_mass", "hand_damping", "hand_stiffness", "link_rate", "k_t_cqlf", "k_t_switching")
-        yield from self.publish("stability", *names)
-
-
-@dataclass(frozen=True, eq=False)
-class TissueLimit(LogRecord):
-    """The tissue of one log, compared with the stability limits of the hand."""
-
-    stiffness: float
-    k_h_needed: float
-    lag_of: str
-    force_lag: float
-    k_t_lag: float
-    damping_needed: float
-
-    def published(self) -> Iterator[Published]:
-        """The hand that the tissue requires, by the Lyapunov function and by the filter's lag."""
-        yield from self.publish(f"stability.{self.log}", "k_h_needed", "force_lag", "k_t_lag", "damping_needed")
+        """The hand and its limits, the headline and the filter with their errors."""
+        measured = ("k_t_limit", "filter_lag", "filter_share")
+        names = [name for name in self.scalars() if name != "hand" and not name.startswith(measured)]
+        yield from self.publish(f"stability.{self.hand}", *names)
+        yield from self.publish(f"stability.{self.hand}", *measured, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,22 +204,15 @@ class HapticResponse(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class HapticRun(Record):
-    """One hand that moves in and out of the tissue, its felt force, and its stability margins.  Fig 8.12"""
+    """One hand that moves in and out of the tissue, and its felt force.  Fig 8.12"""
 
     KEY = ("hand",)
 
     hand: str
-    hand_mass: float
-    hand_damping: float
-    hand_stiffness: float
     out_of_reach: int
     true_peak: float
     felt_peak: float
     felt_error: float
-    k_t_settles: float
-    k_t_response: float
-    stiffness_margin: float
-    delay_margin: float
     t: Column
     plan_x: Column
     hand_x: Column
@@ -226,7 +221,5 @@ class HapticRun(Record):
     felt_force: Column
 
     def published(self) -> Iterator[Published]:
-        """The hand, the forces, and the margins."""
-        names = ("hand_mass", "hand_damping", "hand_stiffness", "out_of_reach", "true_peak", "felt_peak", "felt_error")
-        margins = ("k_t_settles", "k_t_response", "stiffness_margin", "delay_margin")
-        yield from self.publish(f"haptics.{self.hand}", *names, *margins)
+        """The forces."""
+        yield from self.publish(f"haptics.{self.hand}", "out_of_reach", "true_peak", "felt_peak", "felt_error")

@@ -26,7 +26,7 @@ UNLIMITED = re.compile(
     r"ekf-adaptive\..*"  # the noise is tuned to innovations that depend on the noise
     r"|.*\.pso\..*"  # a swarm follows its best particle
     r"|control\..*"  # an integrator chooses its steps
-    r"|haptics\..*"  # bisection for the tissue at which a simulated hand begins to diverge
+    r"|(haptics|stability)\..*"  # bisection for the tissue at which a simulated hand begins to diverge
     r"|.*\.push_delay|tissue\..*\.onset"  # counted in samples until a level is passed
 )
 DIFFERENT, FAR = "differ by more than 1e-9 of their size", "differ by more than their standard deviation"

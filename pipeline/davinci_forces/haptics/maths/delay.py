@@ -1,4 +1,4 @@
-"""The stiffest tissue for which a hand is stable with a delayed force, or with a delayed and held force.
+"""The stiffest tissue for which a hand is stable: with a delayed force, a delayed and held force, or the whole loop.
 
 In contact, m ddx + b dx + K_H x + K_T x(t - d) = 0.  A root reaches the imaginary axis, s = j w, where
 
@@ -11,15 +11,12 @@ same condition then applies on the unit circle, z = exp(j w T), with the hand's 
 Both criteria apply to a hand that is pressed into tissue and stays in contact: above the limit, small motions about
 this position grow.  Without a push the hand leaves the tissue in every period, and no delayed force acts there.
 
-Other limits follow from the frequency response of the whole loop, or from simulations.  T(jw) is the felt force over
-the force K_T x + D dx that the tissue would exert at the hand's position.  It contains arm, filter, link and hold, and
-is 1 if the hand feels the tissue directly.  The hand in contact,
+Other limits follow from the frequency response of the whole loop, or from simulations.  In the whole loop the felt
+force is (G K_T + Z) x.  G(jw) contains arm, filter, link and hold, and is 1 if the hand feels the tissue directly.
+Z(jw) [N/m] is what the hand feels of the arm's motion without tissue, because the filter's input is sampled.  The hand
+in contact, m ddx + b dx + K_H x + (G K_T + Z) x = 0, has a root on the imaginary axis at each w for which
 
-    m ddx + b dx + K_H x + T (K_T x + D dx) = 0,
-
-has a root on the imaginary axis at each w for which
-
-    K_T = (m w^2 - K_H - j b w) / T(jw) - j D w
+    K_T = (m w^2 - K_H - j b w - Z(jw)) / G(jw)
 
 is real and positive; the limit is the smallest of these K_T.
 """
@@ -29,6 +26,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -44,7 +42,7 @@ MIN_CIRCLE_POINTS = 2000
 RESPONSE_POINTS = 4000  # points of an interpolated frequency response
 SUSTAINED_RATIO = 0.97  # an oscillation is sustained if the amplitude ratio of successive quarters is at least this
 SEARCH_FACTOR = 64.0  # largest ratio of limit to first guess, and of guess to limit
-TRIAL_HALVINGS = 7
+TRIAL_HALVINGS, DAMPING_HALVINGS = 7, 40
 
 
 def delay_limit(hand: Hand, delay: float) -> float:
@@ -69,19 +67,18 @@ def crossing_frequency(hand: Hand, delay: float, turn: int) -> float:
     return float(brentq(excess, 0.0, 2.0 * np.pi * (turn + 1) / delay, xtol=1e-14, rtol=1e-13))
 
 
-def damping_needed(hand: Hand, k_t: float, delay: float) -> float:
-    """The damping b [N s/m] that makes the hand stable with tissue of k_t > 0 [N/m] and a delay > 0 [s]."""
+def damping_needed(hand: Hand, k_t: float, limit: Callable[[Hand], float]) -> float:
+    """The damping b [N s/m] of the hand from which `limit` [N/m] exceeds k_t > 0; that of the hand if it does already.
 
-    def log_excess(exponent: float) -> float:
-        return float(np.log(k_t / delay_limit(hand._replace(b=float(np.exp(exponent))), delay)))
-
-    high = np.log(k_t * delay)  # sufficient for small delays, where K_T = b/d
-    while log_excess(high) > 0.0:
-        high += 1.0
-    low = high
-    while log_excess(low) < 0.0:
-        low -= 1.0
-    return float(np.exp(brentq(log_excess, low, high, xtol=1e-10)))
+    A limit of NaN means no limit.
+    """
+    low = high = hand.b
+    while limit(hand._replace(b=high)) < k_t:
+        low, high = high, 2.0 * high
+    for _ in range(DAMPING_HALVINGS):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if limit(hand._replace(b=middle)) < k_t else (low, middle)
+    return high
 
 
 def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
@@ -162,21 +159,35 @@ def harmonic(t: Array, x: Array, w: float) -> complex:
     return complex(2.0 * np.mean((x - x.mean()) * (wave - wave.mean())))
 
 
-def response_limit(hand: Hand, w: Array, T: Complex, damping: float) -> float:
-    """The K_T [N/m] below which a hand in contact is stable with a response T (N,) at w (N,) [rad/s]; NaN for none.
+def response_limit(hand: Hand, w: Array, G: Complex, Z: Complex) -> tuple[float, float]:
+    """The K_T [N/m] below which a hand in contact is stable, and its w [rad/s], with G and Z (N,) [N/m] at w (N,).
 
-    `damping` is the tissue's D [N s/m] times the force scale.  Between the frequencies, log magnitude and angle of the
-    response are interpolated linearly over log w.
+    Both are NaN for no limit.  Between the frequencies, G and Z are interpolated by cubic splines over log w.
     """
     x = np.log(w)
     fine = np.linspace(x[0], x[-1], RESPONSE_POINTS)
-    size, angle = np.interp(fine, x, np.log(np.abs(T))), np.interp(fine, x, np.unwrap(np.angle(T)))
     f = np.exp(fine)
-    k_t = (hand.m * f**2 - hand.k - 1j * hand.b * f) / np.exp(size + 1j * angle) - 1j * damping * f
+    k_t = (hand.m * f**2 - hand.k - 1j * hand.b * f - CubicSpline(x, Z)(fine)) / CubicSpline(x, G)(fine)
     i = np.flatnonzero(np.sign(k_t.imag[:-1]) * np.sign(k_t.imag[1:]) < 0)
     share = k_t.imag[i] / (k_t.imag[i] - k_t.imag[i + 1])
     limits = k_t.real[i] + share * (k_t.real[i + 1] - k_t.real[i])
-    return float(min(limits[limits > 0.0], default=math.nan))
+    crossings = zip(limits[limits > 0.0].tolist(), f[i][limits > 0.0].tolist(), strict=True)
+    return min(crossings, default=(math.nan, math.nan))
+
+
+def formula(hand: Hand, w: float, G: complex, Z: complex) -> tuple[Hand, float, float]:
+    """The hand, the delay [s] and the share of the force for which `delay_limit` / share is the limit at w [rad/s].
+
+    Z adds to the hand's mass and damping.  The damping is not positive for a hand that oscillates without tissue.
+    """
+    moved = hand._replace(m=hand.m - Z.real / w**2, b=hand.b + Z.imag / w)
+    return moved, float(-np.angle(G) % (2.0 * np.pi)) / w, abs(G)
+
+
+def best_delay(delays: Array, limits: Array) -> tuple[float, float]:
+    """The delay [s] with the largest of the limits (N,) [N/m], and that limit; NaN for none."""
+    i = int(np.argmax(np.nan_to_num(limits)))
+    return (float(delays[i]), float(limits[i])) if limits[i] > 0.0 else (math.nan, math.nan)
 
 
 def settles(x: Array, shift: float) -> bool:

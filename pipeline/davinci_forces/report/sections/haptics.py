@@ -1,14 +1,13 @@
-"""A simulated hand with haptic feedback from the tissue: forces over time, their fidelity, and stability margins."""
+"""A simulated hand with haptic feedback from the tissue: forces over time, and their fidelity."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.records import HapticResponse, HapticRun
+from davinci_forces.records import HandLimit, HapticResponse, HapticRun
 from davinci_forces.report.content import (
     Block,
-    Cell,
     Figure,
     HLine,
     Line,
@@ -16,8 +15,6 @@ from davinci_forces.report.content import (
     Panel,
     Prose,
     Section,
-    Table,
-    Verdict,
     VLine,
     VSpan,
     literal,
@@ -37,36 +34,16 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The section's content.  Section 8.4"""
-    yield from (verdict(context, run) for run in runs)
     responses = context.catalogue.records(HapticResponse)
     yield OnScreen(
-        "The haptic loop, simulated: the force that each hand feels, its error, and its stability margins",
+        "The haptic loop, simulated: the force that each hand feels, and its error",
         "haptic-loop",
         (
             Prose(experiment(context, responses)),
             *(traces(context, run) for run in runs),
             *(response_figure(response) for response in responses),
-            margins(context, runs),
         ),
     )
-
-
-def verdict(context: Context, run: HapticRun) -> Verdict:
-    """Whether a hand is stable against the measured tissue, and the stiffest tissue against which it settles."""
-    key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{hand_name(context, run)}”"
-    limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
-    where = f"It settles against tissue up to {limit}, {margin} times the measured stiffness"
-    if not run.k_t_settles > 0.0:
-        where = "No limit of the tissue's stiffness was found"
-    if run.out_of_reach:
-        leaves = f"it leaves the device's reach at {run.t[-1]:.1f} s"
-        return Verdict("warn", f"{name}: **unstable** against the measured tissue: {leaves}. {where}.")
-    stable = run.delay_margin != 0.0  # NaN if the hand is stable with every delay tried
-    off = context.number(f"{key}.felt_error", 2)
-    motion = "stable against the measured tissue"
-    if not stable:
-        motion = "goes in and out within reach, but is **unstable** when it stays in the tissue"
-    return Verdict("good" if stable else "warn", f"{name}: {motion}. {where}. RMS error of the felt force: {off}.")
 
 
 def experiment(context: Context, responses: list[HapticResponse]) -> str:
@@ -90,15 +67,12 @@ def experiment(context: Context, responses: list[HapticResponse]) -> str:
     true, felt, frequency, late = context.numbers("haptics", names)
     return (
         f"{text}\n\nThe model of the slide is {arm}; the model's error on the real arm is not included. To a hand that "
-        f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}. A hand settles if its "
-        "oscillation dies out after it releases a quarter of its push. The limit by simulation includes the arm's "
-        "friction, which makes the felt force oscillate near rest. The limit by linear response treats the loop as "
-        "linear. Both include the damping of the tissue; limits from the delay alone leave this damping out. Try your "
+        f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}. Try your "
         "own numbers: `davinci-forces haptics --help`."
     )
 
 
-def hand_name(context: Context, run: HapticRun) -> str:
+def hand_name(context: Context, run: HapticRun | HandLimit) -> str:
     """The name of a hand; the default hand is named after the thesis only in simulations of the thesis."""
     return "default" if run.hand == "thesis" and not context.compares_with_thesis else literal(run.hand)
 
@@ -112,7 +86,7 @@ def traces(context: Context, run: HapticRun) -> Figure:
     return Figure(
         f"Simulated, hand “{hand_name(context, run)}” in and out of the tissue, contact shaded. Positions from the "
         "surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
-        f"force.{ends}",
+        f"force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",
         (
@@ -171,25 +145,4 @@ def response_figure(response: HapticResponse) -> Figure:
         "haptic-response",
         columns=2,
         height=42,
-    )
-
-
-def margins(context: Context, runs: list[HapticRun]) -> Table:
-    """One row a hand."""
-    names = ("hand_mass", "hand_damping", "hand_stiffness", "true_peak", "felt_peak", "k_t_settles", "k_t_response")
-    rows: list[tuple[Cell, ...]] = []
-    for run in runs:
-        cells = context.numbers(f"haptics.{run.hand}", (*names, "delay_margin"))
-        rows.append((hand_name(context, run), *cells))
-    header = (
-        "Hand", "Mass", "Damping", "Stiffness", "True peak", "Felt peak", "Simulation", "By response", "Delay margin",
-    )  # fmt: skip
-    return Table(
-        "Simulated hands: mass, damping and stiffness; peaks of the true and the felt force; the stiffest tissue that "
-        "each hand settles against, by simulation and by the linear response of the loop; and the delay that may be "
-        "added before the hand is unstable (0: already unstable). A dash marks that no limit was found.",
-        header,
-        tuple(rows),
-        "haptic-margins",
-        "lrrrrrrrr",
     )

@@ -1,10 +1,11 @@
-"""Stability limits of haptic feedback from tissue: switching, delay and sampling."""
+"""Stability limits of haptic feedback from tissue: one headline, its checks, and what else limits it."""
 
 from collections.abc import Iterator
+from itertools import cycle
 
 import numpy as np
 
-from davinci_forces.records import DelayLimit, HapticMotion, StabilityLimit, StabilityMap, TissueLimit
+from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, StabilityMap, Stiffness
 from davinci_forces.report.content import (
     Band,
     Block,
@@ -18,128 +19,137 @@ from davinci_forces.report.content import (
     Section,
     Table,
     Verdict,
-    VLine,
-    literal,
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
-from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.context import Context, label
+from davinci_forces.report.sections.haptics import hand_name
 from davinci_forces.report.sections.parts import MS, THESIS_TISSUE
 
+NORMAL_95 = 1.96  # quantile of a 95 % interval
+COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
+SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
+ROWS = (
+    ("k_t_limit", "**Limit**: formula, measured filter", SAME),
+    ("k_t_response", "Linear response", SAME),
+    ("k_t_simulated", "Simulation", SAME),
+    ("k_t_settles", "Simulation, all effects", f"{SAME}; friction of the arm, damping of the tissue"),
+    ("k_t_cqlf", "Lyapunov function (8.10)", NO_DELAY),
+    ("k_t_switching", "Worst switching", NO_DELAY),
+    ("limit_frequency", "Frequency at the limit", ""),
+    ("filter_lag", "Filter’s lag, in logs", "at that frequency"),
+    ("filter_share", "Filter’s gain, in logs", "at that frequency"),
+    ("loop_delay", "Delay of the felt force", "filter, arm, link, sampling"),
+    ("felt_damping", "Damping felt without tissue", "arm’s motion in the sampled filter"),
+    ("best_delay", "Best additional delay", "largest limit by the response"),
+    ("k_t_best", "Limit with that delay", SAME),
+    ("damping_needed", "Damping needed for the measured tissue", "of the hand, by the response"),
+    ("delay_margin", "Additional delay until unstable", "all effects; 0: already unstable"),
+)
 LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst switching", "vermillion"), "at contact": ("contact", "blue")}
 
 
 def section(context: Context) -> Section | None:
-    """The stability limits of one assumed hand; None if no tissue was measured."""
-    delayed = context.catalogue.records(DelayLimit)
-    return Section("Stability of haptic feedback", "stability", tuple(blocks(context, delayed[0]))) if delayed else None
+    """The stability limits of each simulated hand; None if no tissue was measured."""
+    limits = context.catalogue.records(HandLimit)
+    return Section("Stability of haptic feedback", "stability", tuple(blocks(context, limits))) if limits else None
 
 
-def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
+def blocks(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     """The section's content.  Section 8.3"""
-    tissues = context.catalogue.records(TissueLimit)
-    if tissues:
-        yield verdict(context, tissues)
-    yield Prose(f"{model(context)}\n\n{without_delay(context)}\n\n{with_delay(context, tissues)}")
-    yield limits_figure(context, delayed, tissues)
-    yield OnScreen(
-        "More on stability: the hand that each tissue needs, and the hand's motion",
-        "more-stability",
-        (requirements(context, tissues), *motions(context)),
-    )
+    tissues = [tissue for tissue in context.catalogue.records(Stiffness) if tissue.pushes and tissue.stiffness > 0.0]
+    yield from (verdict(context, limit, tissues) for limit in limits)
+    yield Prose(f"{model(context, limits)}\n\n{without_delay(context)}")
+    yield limits_table(context, limits)
+    yield limits_figure(context, limits, tissues)
+    yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 
-def verdict(context: Context, tissues: list[TissueLimit]) -> Verdict:
-    """Whether the hand is stable against the stiffest tissue with the filter's delay."""
-    softest, stiffest = (choose(tissues, key=lambda tissue: tissue.stiffness) for choose in (min, max))
-    low, high = (stiffness(context, tissue) for tissue in (softest, stiffest))
-    measured = f"the measured tissue, {low}" + f" to {high}" * (softest is not stiffest)
-    prefix = f"stability.{stiffest.log}"
-    if f"{prefix}.k_t_lag" not in context.results:
-        return Verdict("info", f"Stability against {measured}, is not known: no log shows the delay of the filter.")
-    limit, lag, damping = (
-        context.results[f"{prefix}.{n}"].number(2) for n in ("k_t_lag", "force_lag", "damping_needed")
-    )
-    rate = context.results["stability.link_rate"].number(3)
-    stable = stiffest.stiffness < stiffest.k_t_lag
-    return Verdict(
-        "good" if stable else "warn",
-        f"{'The thesis’s' if context.compares_with_thesis else 'The assumed'} model of a hand is "
-        f"{'' if stable else '**not** '}"
-        f"stable against {measured}. With a communication link of {rate} and the filter's delay of {lag} "
-        f"({title(stiffest.lag_of).lower()}), it is stable up to {limit}."
-        + ("" if stable else f" A hand with a damping of at least {damping} would be stable against this tissue."),
-    )
+def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Verdict:
+    """Whether a hand is stable against the stiffest measured tissue: the headline and its interval."""
+    key, name = f"stability.{limit.hand}", hand_name(context, limit)
+    stiffest = max(tissues, key=lambda tissue: tissue.stiffness)
+    tissue = context.number(f"tissue.{stiffest.log}.stiffness")
+    if limit.k_t_limit != limit.k_t_limit:
+        return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
+    headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
+    half = NORMAL_95 * np.nan_to_num(limit.k_t_limit_std)
+    below, above = (limit.k_t_limit + side * half > stiffest.stiffness for side in (-1.0, 1.0))
+    friction = f"With the arm's friction and the tissue's damping, simulation finds {settles}."
+    if below and limit.delay_margin != 0.0:  # NaN for a hand that is stable with every delay tried
+        return Verdict("good", f"Hand “{name}”: **stable** against elastic tissue up to {headline}, above the measured "
+                       f"{tissue}. {friction}")  # fmt: skip
+    if above:
+        return Verdict("warn", f"Hand “{name}”: the limit, {headline}, does not exclude an oscillation against the "
+                       f"measured tissue, {tissue}. {friction}")  # fmt: skip
+    return Verdict("warn", f"Hand “{name}”: **not stable** against the measured tissue, {tissue}: elastic tissue may "
+                   f"have up to {headline}. {friction} A damping of the hand of {needed} would be enough.")  # fmt: skip
 
 
-def stiffness(context: Context, tissue: TissueLimit) -> str:
-    """The stiffness of a measured tissue, with its standard error if there is one."""
-    key = f"tissue.{tissue.log}.stiffness"
+def model(context: Context, limits: list[HandLimit]) -> str:
+    """State the assumed hands, and which of the limits are the same."""
+    hands = [
+        "“{}”: {}, {} and {}".format(
+            hand_name(context, hand),
+            *context.numbers(f"stability.{hand.hand}", ("hand_mass", "hand_damping", "hand_stiffness"), 3),
+        )
+        for hand in limits
+    ]
+    origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
+    rows = [row for row in ((x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits) if min(row) == min(row)]
+    apart = max((max(row) / min(row) - 1.0 for row in rows), default=float("nan"))
+    agree = f"Here they agree within {100.0 * apart:.1f} %. " if rows else ""
     return (
-        str(context.results[key].number())
-        if key in context.results
-        else context.size(tissue, "stiffness", tissue.stiffness)
-    )
-
-
-def model(context: Context) -> str:
-    """State the assumed model of the hand."""
-    m, b, k = (context.results[f"stability.hand_{n}"].number(3) for n in ("mass", "damping", "stiffness"))
-    origin = (
-        f"Mass {m} and damping {b} are the thesis's (8.2)–(8.7); it states no stiffness, and {k} stands for an arm "
-        "held loosely."
-        if context.compares_with_thesis
-        else f"Its mass is assumed as {m}, its damping as {b} and its stiffness as {k}, as of an arm held loosely."
-    )
-    return (
-        "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$. Tissue is a "
-        f"spring $K_T$ on one side of its surface. {origin} Try other hands: `davinci-forces stability --help`."
+        "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
+        f"spring $K_T$ on one side of its surface. The hands are assumed ({'; '.join(hands)}).{origin} The limit is "
+        "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
+        "state the same limit: the formula takes the filter's lag and gain from logs, at the frequency at which the "
+        "hand would oscillate; the response and the simulation contain the filter itself. "
+        f"{agree}The other rows say what else they include. Try other hands: `davinci-forces stability --help`."
     )
 
 
 def without_delay(context: Context) -> str:
     """Explain what the map of Lyapunov functions proves, and what it does not prove.  Fig 8.9"""
-    proved, switching = (context.results[f"stability.{n}"].number(3) for n in ("k_t_cqlf", "k_t_switching"))
     region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
     return (
-        "A common quadratic Lyapunov function proves stability without delay. It exists if and only if "
-        f"$K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}; the numerical solutions of its linear matrix "
-        f"inequality (LMI) in [@stability-limits] agree. Above this limit, in {region}, **this criterion** proves "
-        "nothing; the hand may be stable there, too. A spring that switches on and off at arbitrary times is stable "
-        f"below {switching}. Real tissue acts only in contact, at $x >= 0$. The energy "
-        "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ then falls by $b dot(x)^2$. So **every** "
-        "$K_T >= 0$ is stable without delay."
+        "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; the numerical "
+        "solutions of its linear matrix inequality (LMI) in [@stability-limits] agree. It knows neither delay nor "
+        f"sampling, and allows any switching. In {region} it proves nothing. Real tissue acts only in contact, and "
+        "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$ if the force comes at once. So "
+        "delay and sampling set the limit, not switching."
     )
 
 
-def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
-    """Explain the stability limits due to delay and sampling."""
-    rate = context.results["stability.link_rate"].number(3)
-    late = any(f"stability.{tissue.log}.force_lag" in context.results for tissue in tissues)
-    lag = " The filter's delay is the time from the peak of a push of 1 s to the peak of its estimate." if late else ""
-    return (
-        "A delay $d$ of the force reduces the damping of a hand in contact by about "
-        f"$K_T d$. A communication link of {rate} holds each force for one period, which adds half a period of delay. "
-        "All limits with delay apply to a hand that stays in contact. In simulation, a hand that bounces off is "
-        f"stable up to at least twice this limit.{lag}"
+def limits_table(context: Context, limits: list[HandLimit]) -> Table:
+    """The limits of all hands, with what each includes."""
+    keys = [f"stability.{limit.hand}" for limit in limits]
+    rows = tuple((name, *(context.number(f"{key}.{field}", 3) for key in keys), what) for field, name, what in ROWS)
+    return Table(
+        "Limits of the tissue's stiffness, and what they follow from. The standard error of the first includes those "
+        "of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's parameters. A dash marks "
+        "a limit that was not found, or an error that is not known. No setting is changed.",
+        ("Stiffest stable tissue", *(hand_name(context, limit) for limit in limits), "Includes"),
+        rows,
+        "stability-table",
+        "l" + "r" * len(limits) + "l",
     )
 
 
-def limits_figure(context: Context, delayed: DelayLimit, tissues: list[TissueLimit]) -> Figure:
-    """The map without delay, and the limit over the delay."""
+def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Figure:
+    """The map without delay, and the limit over an additional delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, without delay: up to which a Lyapunov function exists (points: LMI "
-        "solver; line: exact), and up to which the worst switching is stable (dashed). Real tissue is stable above "
-        "both, too. Right, with delay: for a hand that stays in contact (lines) or leaves it (points, simulated).",
-        "Limits of the tissue's stiffness, rising with the stiffness of the hand and falling with the delay of the "
-        "force.",
-        (map_panel(context, tissues), delay_panel(context, delayed, tissues)),
+        "Limits of the tissue's stiffness. Left, hand of (8.10) without delay: up to which a Lyapunov function exists "
+        "(points: LMI solver; line: exact), and up to which the worst switching is stable (dashed). Right, whole loop: "
+        "the limit over an additional delay of the force, for one period of the free hand.",
+        "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
+        (map_panel(context, tissues), delay_panel(context, limits, tissues)),
         "stability-limits",
         columns=2,
         height=62,
     )
 
 
-def map_panel(context: Context, tissues: list[TissueLimit]) -> Panel:
+def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
     """Fig 8.9 with the exact curves and the tissues."""
     beyond = "red in Fig 8.9" if context.compares_with_thesis else "no Lyapunov function"
     marks: list[AnyMark] = [
@@ -173,7 +183,7 @@ def lyapunov_marks(cells: StabilityMap, beyond: str) -> tuple[AnyMark, ...]:
     )
 
 
-def tissue_lines(context: Context, tissues: list[TissueLimit]) -> Iterator[HLine]:
+def tissue_lines(context: Context, tissues: list[Stiffness]) -> Iterator[HLine]:
     """The measured tissues; in simulations of the thesis's experiments, also the tissue of the thesis."""
     for i, tissue in enumerate(tissues):
         yield HLine(tissue.stiffness, "" if i else "measured", "green", "solid")
@@ -181,44 +191,14 @@ def tissue_lines(context: Context, tissues: list[TissueLimit]) -> Iterator[HLine
         yield HLine(THESIS_TISSUE, "thesis", "black", "dotted")
 
 
-def delay_panel(context: Context, delayed: DelayLimit, tissues: list[TissueLimit]) -> Panel:
-    """The limit over the delay."""
-    delay = MS * delayed.delay
-    tried = delayed.k_t_leaving == delayed.k_t_leaving
-    marks: list[AnyMark] = [
-        Line(delay, delayed.k_t_delay, "delay only", "blue", "solid"),
-        Line(delay, delayed.k_t_held, f"delay and link of {delayed.link_rate:g} Hz", "vermillion", "dashed"),
-        Points(delay[tried], delayed.k_t_leaving[tried], "leaving the tissue", "purple"),
-        *tissue_lines(context, tissues),
-    ]
-    late = [tissue for tissue in tissues if tissue.force_lag > 0.0]
-    marks += [VLine(MS * tissue.force_lag, "filter's delay") for tissue in late[:1]]
-    return Panel(
-        "With delay", "delay of the force [ms]", "stiffness of tissue [N/m]", tuple(marks), x_log=True, y_log=True
-    )
-
-
-def requirements(context: Context, tissues: list[TissueLimit]) -> Table:
-    """The stiffness and the damping that each tissue requires of the hand."""
-    names = ("k_h_needed", "force_lag", "k_t_lag", "damping_needed")
-    rows = tuple(
-        (
-            literal(tissue.log),
-            context.number(f"tissue.{tissue.log}.stiffness"),
-            *context.numbers(f"stability.{tissue.log}", names),
-        )
-        for tissue in tissues
-    )
-    header = ("Log", "Stiffness", "$K_H$ for a Lyapunov function", "Filter's delay", "Stable up to", "Damping needed")
-    return Table(
-        "The measured tissue: the stiffness of the hand above which a common quadratic Lyapunov function exists; the "
-        "stiffest tissue that is stable with the filter's delay and the link; and the damping that a hand needs to be "
-        "stable against the measured tissue with this delay.",
-        header,
-        rows,
-        "stability-table",
-        "lrrrrr",
-    )
+def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Panel:
+    """The limit of each hand over an additional delay."""
+    marks: list[AnyMark] = []
+    for limit, colour in zip(limits, cycle(COLOURS), strict=False):
+        known = limit.k_t_delay > 0.0
+        marks.append(Line(MS * limit.delay[known], limit.k_t_delay[known], hand_name(context, limit), colour, "solid"))
+    marks += tissue_lines(context, tissues)
+    return Panel("Whole loop", "additional delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)
 
 
 def motions(context: Context) -> Iterator[Figure]:

@@ -1,0 +1,185 @@
+"""The limits of the tissue's stiffness for a hand: one headline, and what each of the others includes.
+
+The headline is the formula of a delayed force, (G K_T + Z) x, at the frequency of the hand's oscillation at the limit.
+It includes hand, link, sampling, arm and filter, and elastic tissue; the filter's lag and gain are measured in logs.
+The response and the simulation of the same loop, without friction and damping of tissue, contain the filter itself.
+They must agree with the headline.  `k_t_settles` adds the friction of the arm and the damping of the tissue; `k_t_cqlf`
+and `k_t_switching` leave out link, arm, filter, sampling and every delay, and allow switching at arbitrary times.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles
+from davinci_forces.haptics.maths import delay as delays
+from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
+from davinci_forces.haptics.maths.delay import Complex
+from davinci_forces.haptics.scenario import Body, HapticScenario
+from davinci_forces.maths.arrays import Array
+
+NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alone
+SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
+MAX_DELAY_MARGIN = 1.0  # [s]
+TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
+
+# Time [s], effort minus the model's, and the filter's external effort, each (N,).
+Recording = tuple[Array, Array, Array]
+MEASURED = (
+    "k_t_limit", "k_t_limit_std", "limit_frequency", "filter_lag", "filter_lag_std", "filter_share",
+    "filter_share_std", "loop_delay", "felt_damping",
+)  # fmt: skip
+
+
+class HandLimits(NamedTuple):
+    """The limits of one hand; NaN where there is none, or where nothing was measured."""
+
+    k_t_limit: float  # [N/m] headline
+    k_t_limit_std: float
+    k_t_response: float  # the same by the response, and by simulation, of the same loop
+    k_t_simulated: float
+    k_t_settles: float
+    k_t_cqlf: float
+    k_t_switching: float
+    limit_frequency: float  # [Hz] of the oscillation at the limit
+    filter_lag: float  # [s] at that frequency
+    filter_lag_std: float
+    filter_share: float
+    filter_share_std: float
+    loop_delay: float  # [s] of the felt force
+    felt_damping: float  # [N s/m] that the hand feels of the arm's motion
+    best_delay: float  # [s] additional delay with the largest limit
+    k_t_best: float
+    damping_needed: float  # [N s/m] for the scenario's tissue
+    delay_margin: float  # [s] additional delay with which the hand settles; 0 if it never settles
+    delay: Array  # (N,) additional delay, and its limit by the response
+    k_t_delay: Array
+
+
+class LoopResponse(NamedTuple):
+    """The response of the loop over w (N,) [rad/s]: G, and Z (N,) [N/m]."""
+
+    w: Array
+    G: Complex
+    Z: Complex
+
+
+def without_friction(scenario: HapticScenario, body: Body | None = None) -> HapticScenario:
+    """The scenario with elastic tissue and a body without friction, which the filter assumes; or with another body."""
+    assumed = scenario.assumed_body or scenario.body
+    assert scenario.body is not None
+    assert assumed is not None
+    moved, assumed = (
+        x._replace(coulomb=(0.0, 0.0), static=(0.0, 0.0), bristle_stiffness=0.0, bristle_damping=0.0)
+        for x in (body or scenario.body, assumed)
+    )
+    device = scenario.device._replace(strongest=math.inf, step=0.0)
+    return replace(scenario, body=moved, assumed_body=assumed, device=device, damping=0.0, friction=0.0)
+
+
+def felt(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
+    """G and Z [N/m] at a frequency [Hz], from simulations with and without the tissue."""
+    assert scenario.stiffness is not None
+    gain = scenario.device.force * scenario.device.motion
+    Z = NO_TISSUE * felt_share(replace(scenario, stiffness=NO_TISSUE), frequency)
+    return gain * (felt_share(scenario, frequency) - Z / scenario.stiffness), gain * Z
+
+
+def loop_response(scenario: HapticScenario) -> LoopResponse:
+    """The response of the loop without friction; it is the same for every hand."""
+    G, Z = np.array([felt(without_friction(scenario), f) for f in FREQUENCIES.tolist()]).T
+    return LoopResponse(2.0 * np.pi * FREQUENCIES, G, Z)
+
+
+def filter_response(recordings: Sequence[Recording], frequency: float) -> tuple[complex, float]:
+    """The filter's gain and phase at a frequency [Hz] in logs, and the standard error of its real or imaginary part.
+
+    The gain is that of least squares over segments of a Hann window: sum Y conj(X) / sum |X|^2.  Its error is the
+    jackknife's over segments.  NaN with few segments.
+    """
+    cross, power = [], []
+    for t, effort, filtered in recordings:
+        n = round(SEGMENT_PERIODS / frequency / float(t[1] - t[0]))
+        wave = np.exp(-2j * np.pi * frequency * t[:n]) * np.hanning(n)
+        for start in range(0, len(t) - n + 1, n):
+            X, Y = (np.sum(wave * (x[start : start + n] - x[start : start + n].mean())) for x in (effort, filtered))
+            cross.append(Y * np.conj(X))
+            power.append(abs(X) ** 2)
+    if len(power) < MIN_SEGMENTS:
+        return complex(math.nan), math.nan
+    total, without = sum(cross) / sum(power), (sum(cross) - np.array(cross)) / (sum(power) - np.array(power))
+    variance = (len(power) - 1) * np.mean(np.abs(without - without.mean()) ** 2)
+    return complex(total), float(np.sqrt(0.5 * variance))
+
+
+def limits_of(
+    scenario: HapticScenario, hand: Hand, loop: LoopResponse, recordings: Sequence[Recording] = (),
+    bodies: Sequence[Body] = (),
+) -> HandLimits:  # fmt: skip
+    """Compute the limits of a hand, with the filter measured in recordings of a joint, or else as the scenario has it.
+
+    `bodies` are the arm's with one parameter changed by its standard error.
+    """
+    assert scenario.stiffness is not None
+    linear, tissue = without_friction(scenario), scenario.stiffness
+    by_response, w = delays.response_limit(hand, *loop)
+    changed = [without_friction(scenario, body) for body in bodies]
+    measured = measured_limit(linear, hand, w, recordings if scenario.filtered else (), changed)
+    simulated = max_settling(linear, hand, by_response)
+    settles = max_settling(scenario, hand, simulated)
+    added = np.linspace(0.0, 2.0 * math.pi / hand.frequency, TRIED_DELAYS)
+    late = [np.exp(-1j * loop.w * delay) for delay in added.tolist()]
+    k_t_delay = np.array([delays.response_limit(hand, loop.w, loop.G * turn, loop.Z * turn)[0] for turn in late])
+    best = delays.best_delay(added, k_t_delay)
+
+    def settles_with(delay: float) -> bool:
+        return hand_settles(replace(scenario, force_delay=scenario.force_delay + delay), hand)
+
+    margin = delays.max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if hand_settles(scenario, hand) else 0.0
+    needed = delays.damping_needed(hand, tissue, lambda damped: delays.response_limit(damped, *loop)[0])
+    return HandLimits(
+        **measured, k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
+        k_t_switching=switching_limit(hand), best_delay=best[0], k_t_best=best[1], damping_needed=needed,
+        delay_margin=margin, delay=added, k_t_delay=k_t_delay,
+    )  # fmt: skip
+
+
+def max_settling(scenario: HapticScenario, hand: Hand, guess: float) -> float:
+    """The stiffest tissue [N/m] against which the hand settles, searched from a guess or from the scenario's tissue."""
+    start = guess if math.isfinite(guess) else scenario.stiffness or math.nan
+    return delays.max_stable(lambda k_t: hand_settles(replace(scenario, stiffness=k_t), hand), start)
+
+
+def measured_limit(
+    linear: HapticScenario, hand: Hand, w: float, recordings: Sequence[Recording], changed: Sequence[HapticScenario]
+) -> dict[str, Any]:
+    """The fields of `HandLimits` that follow from the formula and the filter: the limit, its error, and their reasons.
+
+    The error is that of the filter's response in the recordings and that of the arm's parameters, by the limits of the
+    `changed` scenarios.  Without recordings the filter is the simulated one.
+    """
+    if not math.isfinite(w):
+        return dict.fromkeys(MEASURED, math.nan)
+    f = 0.5 * w / math.pi
+    G, Z = felt(linear, f)
+    unfiltered, _ = felt(replace(linear, filtered=False), f)
+    H, std = filter_response(recordings, f)
+    known = math.isfinite(std)
+    H = H if known else G / unfiltered
+
+    def limit(G: complex, Z: complex) -> float:
+        moved, delay, share = delays.formula(hand, w, G, Z)
+        return delays.delay_limit(moved, delay) / share if moved.b > 0.0 and moved.m > 0.0 else math.nan
+
+    headline = limit(H * unfiltered, Z)
+    errors = [limit((H + part) * unfiltered, Z) - headline for part in (std, 1j * std) if known]
+    errors += [limit(*felt(scenario, f)) - limit(G, Z) for scenario in changed]
+    lag = -float(np.angle(H)) / w
+    values = (
+        headline, math.hypot(*errors) if errors else math.nan, f, lag, std / abs(H) / w, abs(H), std,
+        delays.formula(hand, w, H * unfiltered, Z)[1], Z.imag / w,
+    )  # fmt: skip
+    return dict(zip(MEASURED, values, strict=True))
