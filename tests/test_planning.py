@@ -163,7 +163,6 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
             "assess.gather",
             "resolve.gather",
             "haptic-limits",
-            "haptic-limits.gather",
         }
         assert {s for s, every in tasks.items() if len(every) == 1} == pooled
     assert reads[0] == reads[1]

@@ -23,7 +23,7 @@ from davinci_forces.records import (
     COLUMN_DTYPES,
     KINDS,
     Control,
-    DelayLimit,
+    HandLimit,
     Excitation,
     FreeWeight,
     Guess,
@@ -38,7 +38,6 @@ from davinci_forces.records import (
     TipBudget,
     TipContact,
     TipForce,
-    TissueLimit,
     TissueModel,
     Weight,
 )
@@ -243,8 +242,7 @@ def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those
         made(Stiffness),
         made(TissueModel),
         guess,
-        made(DelayLimit),
-        made(TissueLimit),
+        made(HandLimit),
         made(HapticResponse),
         made(HapticRun),
     ]

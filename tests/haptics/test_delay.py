@@ -1,4 +1,4 @@
-"""A hand against tissue whose force comes late, or late and held: on both sides of the border, by simulation."""
+"""A hand against tissue whose force comes late, or late and held: on both sides of the border."""
 
 import numpy as np
 import pytest
@@ -7,15 +7,9 @@ from numpy.testing import assert_allclose
 from davinci_forces.errors import BadRequest
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, delayed_hold, sampled_limit
-from davinci_forces.haptics.maths.motion import SAMPLES_PER_DELAY, flow, grows, leaving_limit, simulate_delayed
+from davinci_forces.haptics.maths.motion import flow
 
-PRESSED = 1.0  # [N]
 DELAYS = (0.005, 0.05, 0.3)
-
-
-def simulated(hand: Hand, k_t: float, delay: float, rate: float, push: float = PRESSED) -> bool:
-    """Whether a motion of the hand grows, after its slowest swing has come sixty times."""
-    return grows(hand, simulate_delayed(hand, k_t, delay, rate, push, 60.0 * 2.0 * np.pi / hand.frequency))
 
 
 def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
@@ -32,21 +26,6 @@ def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
     else:
         A[:2, 0] -= k_t * early
     return float(np.abs(np.linalg.eigvals(A)).max())
-
-
-@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])
-@pytest.mark.parametrize("delay", DELAYS)
-def test_a_pressed_hand_is_stable_below_the_limit_of_a_delay_and_not_beyond(hand, delay):
-    limit, rate = delay_limit(hand, delay), 4 * SAMPLES_PER_DELAY / delay
-    exact = delay - 0.5 / rate  # a held force is half a sample later
-    assert [simulated(hand, share * limit, exact, rate) for share in (0.98, 1.02)] == [False, True]
-
-
-@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(1.0, 10.0, 300.0), Hand(0.1, 0.2, 3000.0)])
-@pytest.mark.parametrize(("delay", "rate"), [(0.0, 100.0), (0.05, 100.0), (0.053, 100.0), (0.0004, 1000.0)])
-def test_a_pressed_hand_is_stable_below_the_limit_of_a_held_force_and_not_beyond(hand, delay, rate):
-    limit = sampled_limit(hand, delay, rate)
-    assert [simulated(hand, share * limit, delay, rate) for share in (0.98, 1.02)] == [False, True]
 
 
 @pytest.mark.parametrize("hand", [THESIS_HAND, Hand(0.1, 0.02, 3000.0), Hand(2.0, 40.0, 50.0)])
@@ -86,24 +65,9 @@ def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_o
     assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
 
 
-def test_a_hand_that_nothing_presses_is_stable_for_stiffer_tissue():
-    for delay in (0.02, 0.1):
-        pressed = delay_limit(THESIS_HAND, delay)
-        free = leaving_limit(THESIS_HAND, delay, pressed)
-        assert free > 1.5 * pressed
-        rate = 4 * SAMPLES_PER_DELAY / delay
-        exact = delay - 0.5 / rate
-        assert [simulated(THESIS_HAND, share * free, exact, rate, 0.0) for share in (0.97, 1.03)] == [False, True]
-
-
-def test_a_hand_that_hardly_comes_back_has_no_such_limit_within_reach():
-    hand = Hand(1.0, 30.0, 20.0)
-    assert np.isnan(leaving_limit(hand, 0.1, delay_limit(hand, 0.1)))
-
-
 @pytest.mark.parametrize("delay", DELAYS)
 def test_the_damping_that_is_needed_puts_the_limit_at_the_tissue(delay):
-    needed = damping_needed(THESIS_HAND, 457.24, delay)
+    needed = damping_needed(THESIS_HAND, 457.24, lambda hand: delay_limit(hand, delay))
     assert_allclose(delay_limit(THESIS_HAND._replace(b=needed), delay), 457.24, rtol=1e-6)
 
 

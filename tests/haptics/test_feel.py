@@ -10,7 +10,7 @@ from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.haptics.maths.delay import sampled_limit
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
-from davinci_forces.records import FilterNoise, Fit, HapticResponse, HapticRun
+from davinci_forces.records import FilterNoise, Fit, HandLimit, HapticResponse, HapticRun
 from davinci_forces.robots import davinci
 from davinci_forces.stages.tissue import haptic_limits
 from davinci_forces.study import HapticScenario
@@ -29,7 +29,9 @@ def fit(theta=THETA, estimator="lse") -> Fit:
     columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | dict.fromkeys(("parameter", "phi", "unit"), names)
     about = {"structure": "independent", "cutoff": (17.0,), "effort_lag": (0.0,)}
     about |= {"group": joint.name, "model": "independent", "estimator": estimator, "logs": ("a",)}
-    return Fit(**(numbers | columns | about | {"theta": np.array(theta)}))
+    return Fit(
+        **(numbers | columns | about | {"theta": np.array(theta), "theta_std": np.array([0.01, 0.02, 0.03, 0.04])})
+    )
 
 
 def noise(joint="instrument_slide") -> FilterNoise:
@@ -38,7 +40,8 @@ def noise(joint="instrument_slide") -> FilterNoise:
 
 
 def made(tissues, fits=(), noises=(), scenario=SCENARIO) -> list:
-    return list(haptic_limits.gather(tissues, fits, noises, scenario, davinci.ROBOT, q_tau=0.0))
+    everything = haptic_limits.run(tissues, (), fits, noises, scenario, davinci.ROBOT, q_tau=0.0)
+    return [record for record in everything if isinstance(record, HapticResponse | HandLimit | HapticRun)]
 
 
 @pytest.fixture(scope="module")
@@ -55,37 +58,36 @@ def test_the_tissue_is_the_median_of_those_that_were_measured(records):
     assert_allclose(response.felt_delay, 0.005, rtol=0.02)
 
 
-def test_each_hand_has_its_run_and_its_margins(records):
-    run = records[1]
+def test_each_hand_has_its_run_and_its_limits(records):
+    limit, run = records[1:]
     assert isinstance(run, HapticRun)
-    assert (run.hand, run.hand_mass, run.hand_damping, run.hand_stiffness) == ("one", *HAND)
+    assert (run.hand, limit.hand, limit.hand_mass, limit.hand_damping, limit.hand_stiffness) == ("one", "one", *HAND)
     assert len(run) == 200
     assert run.out_of_reach == 0
-    assert_allclose(run.k_t_settles, sampled_limit(HAND, 0.0, 100.0), rtol=0.03)
-    assert_allclose(run.stiffness_margin, run.k_t_settles / 440.0)
+    assert_allclose(limit.k_t_settles, sampled_limit(HAND, 0.0, 100.0), rtol=0.03)
     assert_allclose(run.true_peak, run.true_force.max())
-    assert run.delay_margin > 0.0
+    assert limit.delay_margin > 0.0
 
 
 def test_a_stated_stiffness_takes_the_place_of_the_measured_one():
-    response, _ = made([stiffness(k=400.0)], scenario=replace(SCENARIO, stiffness=123.0))
+    response, *_ = made([stiffness(k=400.0)], scenario=replace(SCENARIO, stiffness=123.0))
     assert response.tissue_stiffness == 123.0
 
 
 def test_what_slides_is_the_joint_as_it_was_fitted():
-    body, arm_from = haptic_limits.moving_body(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
+    bodies, arm_from = haptic_limits.moving_bodies(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
+    body = bodies[0]
     assert arm_from == "instrument_slide"
     assert_allclose([body.inertia, body.viscous, *body.coulomb], [2.0, 3.0, 4.5, 4.5])
     assert_allclose(body.gravity, -0.2 * 9.81)
+    errors = [np.array([x.inertia, x.viscous, x.coulomb[0]]) - [2.0, 3.0, 4.5] for x in bodies[1:]]
+    assert_allclose(np.sum(errors, axis=0), [0.01 + 0.02, 0.03, 0.04])  # theta_1 and theta_2 make up the inertia
 
 
 @pytest.mark.parametrize("fits", [[], [fit((-3.0, 1.0, 1.0, 1.0))]])
 def test_without_a_fit_that_can_be_it_is_the_thesis_s(fits):
-    assert haptic_limits.moving_body(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (
-        SLIDE,
-        "the thesis",
-    )
-    assert haptic_limits.moving_body(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
+    for joint in (davinci.ROBOT.joint("instrument_slide"), None):
+        assert haptic_limits.moving_bodies(davinci.ROBOT, fits, joint) == ([SLIDE], "the thesis")
 
 
 def test_the_filter_s_noise_is_the_joint_s(monkeypatch):

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import FilterInput
 from davinci_forces.haptics import loop as haptic
-from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
-from davinci_forces.haptics.maths.delay import delay_limit, harmonic, response_limit, sampled_limit, zero_order_hold
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND
+from davinci_forces.haptics.maths.delay import harmonic, zero_order_hold
 from davinci_forces.haptics.maths.motion import simulate_switching
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
@@ -54,36 +54,6 @@ def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
     assert_array_equal(run.estimates, ekf.track(recorded, haptic.filter_noise(scenario)).tau_ext)
 
 
-@pytest.mark.medium
-@pytest.mark.parametrize("hand", [THESIS_HAND, FIRM, Hand(1.0, 10.0, 300.0)])
-@pytest.mark.parametrize("delay", [0.0, 0.03])
-def test_with_an_ideal_arm_the_limit_is_that_of_a_held_force(hand, delay):
-    """Where a swing that shrinks by 3 % in a quarter of the time counts as lasting: that is within 3 %."""
-    scenario = replace(IDEAL, force_delay=delay)
-    margins = haptic.margins(scenario, hand, haptic.response(scenario))
-    assert_allclose(margins.stiffness, sampled_limit(hand, delay, 100.0), rtol=0.03)
-
-
-def test_the_response_of_an_ideal_arm_is_half_a_message_late_and_its_limit_that_of_the_delay():
-    answer = haptic.response(replace(IDEAL, position_delay=0.01, force_delay=0.02))
-    assert_allclose(answer.late[:8], 0.035, atol=2e-4)
-    assert_allclose(answer.share[:8], 1.0, atol=2e-3)
-    limit = response_limit(THESIS_HAND, 2.0 * np.pi * answer.frequency, answer.T, 0.0)
-    assert_allclose(limit, delay_limit(THESIS_HAND, 0.035), rtol=0.02)
-
-
-def test_tissue_that_damps_makes_the_limit_by_the_response_higher():
-    w = 2.0 * np.pi * np.geomspace(0.2, 12.0, 200)
-    T = np.exp(-0.05j * w)
-    plain, damped = (response_limit(THESIS_HAND, w, T, damping) for damping in (0.0, 2.0))
-    assert_allclose(plain, delay_limit(THESIS_HAND, 0.05), rtol=1e-3)
-    assert damped > 2.0 * plain
-
-
-def test_a_response_whose_hand_meets_no_limit_has_none():
-    assert np.isnan(response_limit(Hand(1.0, 1e3, 100.0), np.geomspace(1.0, 10.0, 9), np.ones(9) * 0.5j, 0.0))
-
-
 def test_the_harmonic_of_a_sine_is_its_amplitude():
     t = np.arange(1000) / 1000.0
     w = 2.0 * np.pi * 3.0
@@ -105,31 +75,6 @@ def test_a_sensor_in_place_of_the_filter_is_felt_at_the_next_message():
     messages = run.true[::turn]
     assert_allclose(run.felt[::turn], messages, atol=1e-12)
     assert_allclose(run.felt[turn - 1 :: turn], messages, atol=1e-12)  # held until the next
-
-
-@pytest.mark.medium
-def test_a_later_force_leaves_a_smaller_margin():
-    limits = []
-    for delay in (0.0, 0.02, 0.05, 0.1):
-        scenario = replace(FULL, force_delay=delay)
-        limits.append(haptic.margins(scenario, FIRM, haptic.response(scenario)).stiffness)
-    assert (np.diff(limits) < 0.0).all(), limits
-
-
-@pytest.mark.medium
-def test_without_coulomb_friction_the_limit_by_simulation_and_by_response_agree():
-    """The response taken at the limit, as an arm gives way to stiff tissue; between few frequencies."""
-    smooth = SLIDE._replace(coulomb=(1e-9, 1e-9), static=(1e-9, 1e-9))
-    scenario = replace(FULL, body=smooth, assumed_body=smooth, friction=0.0, stiffness=1700.0)
-    margins = haptic.margins(scenario, FIRM, haptic.response(scenario))
-    assert_allclose(margins.stiffness, margins.by_response, rtol=0.03)
-
-
-@pytest.mark.medium
-def test_a_weaker_felt_force_bears_stiffer_tissue_in_proportion():
-    halved = replace(IDEAL, device=IDEAL.device._replace(force=0.5))
-    margins = haptic.margins(halved, THESIS_HAND, haptic.response(halved))
-    assert_allclose(margins.stiffness, 2.0 * sampled_limit(THESIS_HAND, 0.0, 100.0), rtol=0.03)
 
 
 def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():

@@ -137,7 +137,7 @@ def test_the_command_says_what_each_hand_feels_and_where_its_limits_are(tmp_path
     text = said(written(tmp_path, SHORT))
     assert "simulated, against tissue of 100 N/m" in text
     assert "Hand 'still' of m = 1 kg, b_H = 40 N s/m and K_H = 500 N/m" in text
-    assert "stable against tissue up to" in text
+    assert "limit for elastic tissue" in text
 
 
 def test_its_numbers_and_traces_are_for_machines_too(tmp_path):

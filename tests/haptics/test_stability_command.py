@@ -46,10 +46,23 @@ def test_people_are_told_what_each_limit_means_and_where_the_thesis_s_tissue_is(
     text = said("--delay", "0.05")
     assert "Lyapunov" in text
     assert "worst" in text
-    assert "457.24 N/m, is above both limits of arbitrary switching" in text
-    assert "it is above k_t_delay" in text
-    assert "below all limits" in said("--k-h", "100000")
-    assert "with this delay it is stable, too" in said("--b-h", "100", "--delay", "0.01")
+    assert "457.24 N/m, needs a hand with a damping of 19.5 N s/m" in text
+    assert "No setting is changed" in text
+    assert "stable against the tissue of the thesis" in said("--b-h", "100", "--delay", "0.01")
+    for words in (said(), said("--delay", "0")):
+        assert "add --delay or --rate" in words
+        assert "any" not in words.replace("every switching", "")
+
+
+@pytest.mark.parametrize("options", [("--delay", "0.05"), ("--delay", "0.1", "--rate", "100"), ("--rate", "50")])
+def test_the_delay_with_the_largest_limit_is_stated_beside_what_it_gains(options):
+    found = limits(*options)
+    again = limits(
+        "--delay", str(found["best_delay"]), *options[options.index("--rate") if "--rate" in options else 9 :]
+    )
+    assert_allclose(again["k_t_delay"], found["k_t_best"], rtol=1e-6)
+    assert found["k_t_best"] >= found["k_t_delay"]
+    assert found["best_delay"] >= (found["delay"] or 0.0)
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,9 @@ RISE_TIME, RELEASE_TIME = (
     3.0,
 )  # [s] when the force has risen to steady force plus share, and when the share is released
 SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visible
-FREQUENCIES = np.geomspace(0.2, 12.0, 28)  # [Hz] of the frequency response
+FREQUENCIES = np.geomspace(0.2, 30.0, 33)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
+MAX_SPEED = 0.6  # [m/s] of that motion; at 0.8 m/s the default motor reaches its voltage
 TRANSIENT, MIN_WATCH = 2.0, 2.0  # [s] initial time that is not evaluated, and least evaluated time
 
 
@@ -108,7 +109,7 @@ def felt_share(scenario: HapticScenario, frequency: float) -> complex:
     ticks = round((TRANSIENT + turns / frequency) / scenario.tick)
     t = np.arange(ticks + 1) * scenario.tick
     ease = 0.5 * (1.0 - np.cos(np.pi * np.clip(t / (0.5 * TRANSIENT), 0.0, 1.0)))
-    path = np.column_stack([ease * (MEAN_DEPTH + AMPLITUDE * np.sin(w * t)), np.zeros(len(t))])
+    path = np.column_stack([ease * (MEAN_DEPTH + min(AMPLITUDE, MAX_SPEED / w) * np.sin(w * t)), np.zeros(len(t))])
     path[:, 1] = np.gradient(path[:, 0], scenario.tick)
     noise = np.zeros((_turns(scenario, ticks), 3))
     run = _run(scenario, Hand(1.0, 1.0, 1.0), np.zeros(ticks), noise, 0.0, path)
