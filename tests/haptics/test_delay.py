@@ -6,10 +6,17 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
-from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, delayed_hold, sampled_limit
-from davinci_forces.haptics.maths.motion import flow
+from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit, zero_order_hold
 
 DELAYS = (0.005, 0.05, 0.3)
+
+
+def delayed_hold(hand: Hand, delay: float, rate: float):
+    """x_(k+1) = Phi x_k + early u_(k-n) + late u_(k-n-1): the previous force acts for the rest of the delay."""
+    samples = int(delay * rate + 1e-9)
+    Phi, whole = zero_order_hold(hand, 1.0 / rate)
+    _, early = zero_order_hold(hand, 1.0 / rate - max(delay - samples / rate, 0.0))
+    return Phi, early, whole - early, samples
 
 
 def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
@@ -48,21 +55,6 @@ def test_a_force_held_ever_more_often_is_a_delayed_one(hand):
     """A hand that is hardly damped meets the limit after whole turns of its delay."""
     for delay in (0.05, 0.17):
         assert_allclose(sampled_limit(hand, delay, 5000.0), delay_limit(hand, delay + 1e-4), rtol=1e-3)
-
-
-@pytest.mark.parametrize("delay", [0.0, 0.05, 0.053, 0.0004])
-def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_one(delay):
-    """The force of the sample before acts until the rest of the delay is over."""
-    rate, x, before, new = 100.0, (0.02, -0.3), 1.5, -4.0
-    rest = delay - int(delay * rate + 1e-9) / rate
-    state = x
-    for force, duration in ((before, rest), (new, 1.0 / rate - rest)):
-        still = force / THESIS_HAND.k  # where the hand would rest
-        at, dx = flow(THESIS_HAND, 0.0, (state[0] - still, state[1]), duration)
-        state = at + still, dx
-    Phi, early, after, samples = delayed_hold(THESIS_HAND, delay, rate)
-    assert samples == round((delay - rest) * rate)
-    assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
 
 
 @pytest.mark.parametrize("delay", DELAYS)

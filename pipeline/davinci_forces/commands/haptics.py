@@ -64,7 +64,7 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
     response, loop = haptic.response(scenario), limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:
-        run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, hand, loop)._asdict()
+        run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, name, hand, loop)
         if csv is not None:
             _write_csv(csv / f"{name}.csv", run)
         hands[name] = {
@@ -75,7 +75,7 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
             "felt_peak": float(run.felt.max()),
             "felt_error": run.error,
             "out_of_reach": float(run.t[-1]) if run.thrown else None,
-        } | {key: _known(value) for key, value in found.items() if isinstance(value, float)}
+        } | {key: _known(getattr(found, key)) for key in found.scalars() if not key.startswith(("hand", "link"))}
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}

@@ -83,15 +83,13 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     if delay is None and rate is None:
         return limits
 
-    def limit(late: float) -> float:
-        return delay_limit(hand, late) if rate is None else sampled_limit(hand, late, rate)
-
-    now = delay or 0.0
-    limits["k_t_delay"] = limit(now) if now or rate else None
-    if limits["k_t_delay"] is not None:
-        tried = now + np.linspace(0.0, 2.0 * np.pi / hand.frequency, TRIED_DELAYS)
-        best = best_delay(tried, np.array([limit(late) for late in tried.tolist()]))
-        limits |= dict(zip(("best_delay", "k_t_best"), best, strict=True))
+    now, hold = delay or 0.0, 0.5 / rate if rate else 0.0
+    if not now + hold:
+        return limits | {"k_t_delay": None}
+    tried = now + np.linspace(0.0, 2.0 * np.pi / hand.frequency, TRIED_DELAYS)
+    best, _ = best_delay(tried, np.array([delay_limit(hand, late + hold) for late in tried.tolist()]))
+    at_now, at_best = (sampled_limit(hand, d, rate) if rate else delay_limit(hand, d) for d in (now, best))
+    limits |= {"k_t_delay": at_now, "best_delay": best, "k_t_best": at_best}
     return limits
 
 

@@ -20,6 +20,7 @@ from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_lim
 from davinci_forces.haptics.maths.delay import Complex
 from davinci_forces.haptics.scenario import Body, HapticScenario
 from davinci_forces.maths.arrays import Array
+from davinci_forces.records import HandLimit
 
 NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alone
 SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
@@ -32,31 +33,6 @@ MEASURED = (
     "k_t_limit", "k_t_limit_std", "limit_frequency", "filter_lag", "filter_lag_std", "filter_share",
     "filter_share_std", "loop_delay", "felt_damping",
 )  # fmt: skip
-
-
-class HandLimits(NamedTuple):
-    """The limits of one hand; NaN where there is none, or where nothing was measured."""
-
-    k_t_limit: float  # [N/m] headline
-    k_t_limit_std: float
-    k_t_response: float  # the same by the response, and by simulation, of the same loop
-    k_t_simulated: float
-    k_t_settles: float
-    k_t_cqlf: float
-    k_t_switching: float
-    limit_frequency: float  # [Hz] of the oscillation at the limit
-    filter_lag: float  # [s] at that frequency
-    filter_lag_std: float
-    filter_share: float
-    filter_share_std: float
-    loop_delay: float  # [s] of the felt force
-    felt_damping: float  # [N s/m] that the hand feels of the arm's motion
-    best_delay: float  # [s] additional delay with the largest limit
-    k_t_best: float
-    damping_needed: float  # [N s/m] for the scenario's tissue
-    delay_margin: float  # [s] additional delay with which the hand settles; 0 if it never settles
-    delay: Array  # (N,) additional delay, and its limit by the response
-    k_t_delay: Array
 
 
 class LoopResponse(NamedTuple):
@@ -116,9 +92,9 @@ def filter_response(recordings: Sequence[Recording], frequency: float) -> tuple[
 
 
 def limits_of(
-    scenario: HapticScenario, hand: Hand, loop: LoopResponse, recordings: Sequence[Recording] = (),
+    scenario: HapticScenario, name: str, hand: Hand, loop: LoopResponse, recordings: Sequence[Recording] = (),
     bodies: Sequence[Body] = (),
-) -> HandLimits:  # fmt: skip
+) -> HandLimit:  # fmt: skip
     """Compute the limits of a hand, with the filter measured in recordings of a joint, or else as the scenario has it.
 
     `bodies` are the arm's with one parameter changed by its standard error.
@@ -140,8 +116,8 @@ def limits_of(
 
     margin = delays.max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if hand_settles(scenario, hand) else 0.0
     needed = delays.damping_needed(hand, tissue, lambda damped: delays.response_limit(damped, *loop)[0])
-    return HandLimits(
-        **measured, k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
+    return HandLimit(
+        name, *hand, scenario.link_rate, **measured, k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
         k_t_switching=switching_limit(hand), best_delay=best[0], k_t_best=best[1], damping_needed=needed,
         delay_margin=margin, delay=added, k_t_delay=k_t_delay,
     )  # fmt: skip
@@ -156,7 +132,7 @@ def max_settling(scenario: HapticScenario, hand: Hand, guess: float) -> float:
 def measured_limit(
     linear: HapticScenario, hand: Hand, w: float, recordings: Sequence[Recording], changed: Sequence[HapticScenario]
 ) -> dict[str, Any]:
-    """The fields of `HandLimits` that follow from the formula and the filter: the limit, its error, and their reasons.
+    """The fields of `HandLimit` that follow from the formula and the filter: the limit, its error, and their reasons.
 
     The error is that of the filter's response in the recordings and that of the arm's parameters, by the limits of the
     `changed` scenarios.  Without recordings the filter is the simulated one.

@@ -5,8 +5,12 @@ In contact, m ddx + b dx + K_H x + K_T x(t - d) = 0.  A root reaches the imagina
     K_T = |m w^2 - K_H - j b w|   and   w d = arg(m w^2 - K_H + j b w) + 2 pi n.
 
 The angle decreases from pi to 0 while w d increases, so that each n has one w.  The limit is the smallest K_T of all n:
-below the limit no root crosses.  A computer samples x with period T and holds the resulting force, with a delay d.  The
-same condition then applies on the unit circle, z = exp(j w T), with the hand's exact response to a held force.
+below the limit no root crosses.  A computer samples x with period T and holds the resulting force, with a delay d.
+With P(s) = 1 / (m s^2 + b s + K_H), z = exp(j w T) is then a root on the unit circle where
+
+    K_T = -1 / sum_n P(s_n) (1 - exp(-s_n T)) / (s_n T) exp(-s_n d),   s_n = j (w + 2 pi n / T),
+
+the sum over the images of the sampled position.
 
 Both criteria apply to a hand that is pressed into tissue and stays in contact: above the limit, small motions about
 this position grow.  Without a push the hand leaves the tissue in every period, and no delayed force acts there.
@@ -39,6 +43,7 @@ Complex = NDArray[np.complex128]
 MAX_DELAY_SAMPLES = 1000  # with a longer delay, a held force is nearly continuous
 POINTS_PER_SAMPLE = 40  # points on the unit circle, for each sample of delay and for each width of the resonance
 MIN_CIRCLE_POINTS = 2000
+IMAGES = np.arange(-20, 20)  # n of the images, in pairs at half the rate
 RESPONSE_POINTS = 4000  # points of an interpolated frequency response
 SUSTAINED_RATIO = 0.97  # an oscillation is sustained if the amplitude ratio of successive quarters is at least this
 SEARCH_FACTOR = 64.0  # largest ratio of limit to first guess, and of guess to limit
@@ -94,54 +99,29 @@ def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
             f"a delay of {delay:g} s is {delay * rate:.0f} samples of {rate:g} Hz, more than {MAX_DELAY_SAMPLES}; "
             "leave the rate out: the force is then nearly continuous"
         )
-    Phi, early, late, samples = delayed_hold(hand, delay, rate)
 
-    def root_stiffness(theta: Array) -> Complex:
-        """The complex K_T for which z = exp(j theta) is a root."""
-        z = np.exp(1j * theta)
-        determinant = z**2 - np.trace(Phi) * z + np.linalg.det(Phi)
-        force = numerator(Phi, early, z) + numerator(Phi, late, z) / z
-        return np.asarray(-determinant * z**samples / force)
+    def root_stiffness(w: Array) -> Complex:
+        p = 1j * (w + 2.0 * np.pi * rate * IMAGES[:, np.newaxis])
+        held = -rate * np.expm1(-p / rate) / p * np.exp(-p * delay) / (hand.m * p**2 + hand.b * p + hand.k)
+        return np.asarray(-1.0 / held.sum(axis=0))
 
-    theta = unit_circle_angles(hand, rate, samples)
-    imaginary = root_stiffness(theta).imag
-    crossings = np.flatnonzero(np.sign(imaginary[:-1]) * np.sign(imaginary[1:]) < 0)
-    roots = [
-        brentq(lambda angle: float(root_stiffness(np.array([angle])).imag[0]), theta[i], theta[i + 1], rtol=1e-13)
-        for i in crossings.tolist()
-    ]
-    stiffness = root_stiffness(np.array([*roots, np.pi])).real
-    return float(stiffness[stiffness > 0.0].min())
-
-
-def numerator(Phi: Array, column: Array, z: Complex) -> Complex:
-    """The first row of adj(z I - Phi) times a column (2,), at z (N,): the numerator of a position."""
-    return np.asarray((z - Phi[1, 1]) * column[0] + Phi[0, 1] * column[1])
+    w = rate * unit_circle_angles(hand, rate, int(delay * rate))
+    k_t = root_stiffness(w)
+    _, below = lowest_crossing(k_t, w)
+    near = np.linspace(below, w[w > below].min(initial=w[-1]), MIN_CIRCLE_POINTS)
+    limits = lowest_crossing(root_stiffness(near), near)[0], float(k_t[-1].real)
+    return min(limit for limit in limits if limit > 0.0)
 
 
 def unit_circle_angles(hand: Hand, rate: float, samples: int) -> Array:
-    """Angles in (0, pi), dense enough to separate the crossings, and densest around the hand's resonance."""
+    """Angles in (0, pi], dense enough to separate the crossings, and densest around the hand's resonance."""
     even = np.linspace(0.0, np.pi, max(MIN_CIRCLE_POINTS, POINTS_PER_SAMPLE * (samples + 1)) + 1)[1:-1]
     width = 0.5 * hand.b / hand.m / rate
     swing = float(np.sqrt(max(hand.frequency**2 - (0.5 * hand.b / hand.m) ** 2, 0.0))) / rate
     near = swing + width / POINTS_PER_SAMPLE * np.arange(-10 * POINTS_PER_SAMPLE, 10 * POINTS_PER_SAMPLE + 1)
     folded = np.abs((near + np.pi) % (2.0 * np.pi) - np.pi)  # aliases of frequencies above half the rate
     low = np.geomspace(1e-6 * min(width, even[0]), even[0], MIN_CIRCLE_POINTS)
-    return np.unique(np.concatenate([even, low, folded[(folded > 0.0) & (folded < np.pi)]]))
-
-
-def delayed_hold(hand: Hand, delay: float, rate: float) -> tuple[Array, Array, Array, int]:
-    """The exact response of the free hand to a delayed and held force over one sample.
-
-    x_(k+1) = Phi x_k + early u_(k-n) + late u_(k-n-1), where u = -K_T x is the tissue's force at a sample and n the
-    whole samples of delay.  The force of the previous sample acts until the remainder of the delay is over.
-    """
-    period = 1.0 / rate
-    samples = int(delay * rate + 1e-9)
-    remainder = max(delay - samples * period, 0.0)
-    Phi, whole = zero_order_hold(hand, period)
-    _, early = zero_order_hold(hand, period - remainder)
-    return Phi, early, whole - early, samples
+    return np.unique(np.concatenate([even, low, folded[(folded > 0.0) & (folded < np.pi)], [np.pi]]))
 
 
 def zero_order_hold(hand: Hand, duration: float) -> tuple[Array, Array]:
@@ -167,11 +147,16 @@ def response_limit(hand: Hand, w: Array, G: Complex, Z: Complex) -> tuple[float,
     x = np.log(w)
     fine = np.linspace(x[0], x[-1], RESPONSE_POINTS)
     f = np.exp(fine)
-    k_t = (hand.m * f**2 - hand.k - 1j * hand.b * f - CubicSpline(x, Z)(fine)) / CubicSpline(x, G)(fine)
+    felt = hand.m * f**2 - hand.k - 1j * hand.b * f - CubicSpline(x, Z)(fine)
+    return lowest_crossing(felt / CubicSpline(x, G)(fine), f)
+
+
+def lowest_crossing(k_t: Complex, w: Array) -> tuple[float, float]:
+    """The smallest positive real value of k_t (N,) between two w (N,), and its w; NaN for none."""
     i = np.flatnonzero(np.sign(k_t.imag[:-1]) * np.sign(k_t.imag[1:]) < 0)
     share = k_t.imag[i] / (k_t.imag[i] - k_t.imag[i + 1])
     limits = k_t.real[i] + share * (k_t.real[i + 1] - k_t.real[i])
-    crossings = zip(limits[limits > 0.0].tolist(), f[i][limits > 0.0].tolist(), strict=True)
+    crossings = zip(limits[limits > 0.0].tolist(), w[i][limits > 0.0].tolist(), strict=True)
     return min(crossings, default=(math.nan, math.nan))
 
 

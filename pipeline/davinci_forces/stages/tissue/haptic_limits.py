@@ -65,8 +65,7 @@ def run(
     changed = () if haptics.body else bodies[1:]
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
-        limit = limits.limits_of(scenario, hand, loop, recordings, changed)
-        yield HandLimit(name, *hand, scenario.link_rate, **limit._asdict())
+        yield limits.limits_of(scenario, name, hand, loop, recordings, changed)
         yield haptic_run(name, hand, scenario)
 
 
