@@ -72,7 +72,7 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     import numpy as np
 
     from davinci_forces.haptics.maths import bimodal, lmi
-    from davinci_forces.haptics.maths.delay import best_delay, delay_limit, sampled_limit
+    from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 
     switching = bimodal.switching_limit(hand)
     limits: Limits = {
@@ -82,12 +82,11 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     }
     if delay is None and rate is None:
         return limits
-
     now, hold = delay or 0.0, 0.5 / rate if rate else 0.0
     if not now + hold:
         return limits | {"k_t_delay": None}
     tried = now + np.linspace(0.0, 2.0 * np.pi / hand.frequency, TRIED_DELAYS)
-    best, _ = best_delay(tried, np.array([delay_limit(hand, late + hold) for late in tried.tolist()]))
+    best = max(tried.tolist(), key=lambda late: delay_limit(hand, late + hold))
     at_now, at_best = (sampled_limit(hand, d, rate) if rate else delay_limit(hand, d) for d in (now, best))
     limits |= {"k_t_delay": at_now, "best_delay": best, "k_t_best": at_best}
     return limits
@@ -98,37 +97,30 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
     from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE
     from davinci_forces.haptics.maths.delay import damping_needed, delay_limit
 
+    criteria = {
+        "k_t_cqlf": "below it, one quadratic Lyapunov function decreases in both modes",
+        "k_t_lmi": "the same, computed from the matrix inequality (8.10)",
+        "k_t_switching": "below it, every switching is stable; above it, the worst switching is not",
+        "k_t_delay": "below it, a hand that stays in contact is stable, with the delayed and held force",
+    }
     lines = [
         f"Limits of the tissue stiffness K_T for a hand of m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and "
         f"K_H = {hand.k:g} N/m:",
-        f"  k_t_cqlf      {_newtons(limits['k_t_cqlf'])}  below it, one quadratic Lyapunov function decreases in both "
-        "modes",
-        f"  k_t_lmi       {_newtons(limits['k_t_lmi'])}  the same, computed from the matrix inequality (8.10)",
-        f"  k_t_switching {_newtons(limits['k_t_switching'])}  below it, every switching is stable; above it, the "
-        "worst switching is not",
+        *(
+            f"  {key:13} {value:8.4g} N/m  {criteria[key]}"
+            for key, value in limits.items()
+            if value and key in criteria
+        ),
     ]
     limit = limits.get("k_t_delay")
     if limit is None:
         return "\n".join([*lines, "", "These know no delay, which limits a real hand: add --delay or --rate."])
-    how = [f"delayed by {delay:g} s"] if delay else []
-    how += [f"held at {rate:g} Hz"] if rate is not None else []
     lines += [
-        f"  k_t_delay     {_newtons(limit)}  below it, a hand that stays in contact is stable, with the force "
-        f"{' and '.join(how)}",
         f"The first three allow any switching and know no delay; k_t_delay is the limit with delay. It is largest, "
         f"{limits['k_t_best']:.4g} N/m ({limits['k_t_best'] / limit:.3g} times), at a delay of "  # type: ignore[operator]
         f"{limits['best_delay']:.3g} s, of those up to a period of the free hand longer. No setting is changed.",
     ]
-    if limit <= THESIS_TISSUE:
-        total = (delay or 0.0) + (0.5 / rate if rate else 0.0)
-        damping = damping_needed(hand, THESIS_TISSUE, lambda damped: delay_limit(damped, total))
-        lines += [
-            f"The tissue of the thesis, {THESIS_TISSUE:g} N/m, needs a hand with a damping of {damping:.3g} N s/m."
-        ]
-    else:
-        lines += [f"With this delay, the hand is stable against the tissue of the thesis, {THESIS_TISSUE:g} N/m."]
+    total = (delay or 0.0) + (0.5 / rate if rate else 0.0)
+    damping = damping_needed(hand, THESIS_TISSUE, lambda damped: delay_limit(damped, total))
+    lines += [f"Tissue of {THESIS_TISSUE:g} N/m, as in the thesis, needs a hand with a damping of {damping:.3g} N s/m."]
     return "\n".join(lines)
-
-
-def _newtons(value: float | None) -> str:
-    return f"{value:.4g} N/m".rjust(12)

@@ -10,7 +10,7 @@ and `k_t_switching` leave out link, arm, filter, sampling and every delay, and a
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles
 from davinci_forces.haptics.maths import delay as delays
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import Complex
-from davinci_forces.haptics.scenario import Body, HapticScenario
+from davinci_forces.haptics.scenario import SLIDE, Body, HapticScenario
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HandLimit
 
@@ -29,28 +29,15 @@ TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
 
 # Time [s], effort minus the model's, and the filter's external effort, each (N,).
 Recording = tuple[Array, Array, Array]
-MEASURED = (
-    "k_t_limit", "k_t_limit_std", "limit_frequency", "filter_lag", "filter_lag_std", "filter_share",
-    "filter_share_std", "loop_delay", "felt_damping",
-)  # fmt: skip
-
-
-class LoopResponse(NamedTuple):
-    """The response of the loop over w (N,) [rad/s]: G, and Z (N,) [N/m]."""
-
-    w: Array
-    G: Complex
-    Z: Complex
+# w (N,) [rad/s], and at each w G and Z [N/m].
+LoopResponse = tuple[Array, Complex, Complex]
 
 
 def without_friction(scenario: HapticScenario, body: Body | None = None) -> HapticScenario:
     """The scenario with elastic tissue and a body without friction, which the filter assumes; or with another body."""
-    assumed = scenario.assumed_body or scenario.body
-    assert scenario.body is not None
-    assert assumed is not None
     moved, assumed = (
         x._replace(coulomb=(0.0, 0.0), static=(0.0, 0.0), bristle_stiffness=0.0, bristle_damping=0.0)
-        for x in (body or scenario.body, assumed)
+        for x in (body or scenario.body or SLIDE, scenario.assumed_body or scenario.body or SLIDE)
     )
     device = scenario.device._replace(strongest=math.inf, step=0.0)
     return replace(scenario, body=moved, assumed_body=assumed, device=device, damping=0.0, friction=0.0)
@@ -67,7 +54,7 @@ def felt(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
 def loop_response(scenario: HapticScenario) -> LoopResponse:
     """The response of the loop without friction; it is the same for every hand."""
     G, Z = np.array([felt(without_friction(scenario), f) for f in FREQUENCIES.tolist()]).T
-    return LoopResponse(2.0 * np.pi * FREQUENCIES, G, Z)
+    return 2.0 * np.pi * FREQUENCIES, G, Z
 
 
 def filter_response(recordings: Sequence[Recording], frequency: float) -> tuple[complex, float]:
@@ -107,9 +94,9 @@ def limits_of(
     simulated = max_settling(linear, hand, by_response)
     settles = max_settling(scenario, hand, simulated)
     added = np.linspace(0.0, 2.0 * math.pi / hand.frequency, TRIED_DELAYS)
-    late = [np.exp(-1j * loop.w * delay) for delay in added.tolist()]
-    k_t_delay = np.array([delays.response_limit(hand, loop.w, loop.G * turn, loop.Z * turn)[0] for turn in late])
-    best = delays.best_delay(added, k_t_delay)
+    turns = np.exp(-1j * loop[0] * added[:, np.newaxis])
+    k_t_delay = np.array([delays.response_limit(hand, loop[0], loop[1] * turn, loop[2] * turn)[0] for turn in turns])
+    best = int(np.argmax(np.nan_to_num(k_t_delay)))
 
     def settles_with(delay: float) -> bool:
         return hand_settles(replace(scenario, force_delay=scenario.force_delay + delay), hand)
@@ -117,9 +104,10 @@ def limits_of(
     margin = delays.max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if hand_settles(scenario, hand) else 0.0
     needed = delays.damping_needed(hand, tissue, lambda damped: delays.response_limit(damped, *loop)[0])
     return HandLimit(
-        name, *hand, scenario.link_rate, **measured, k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
-        k_t_switching=switching_limit(hand), best_delay=best[0], k_t_best=best[1], damping_needed=needed,
-        delay_margin=margin, delay=added, k_t_delay=k_t_delay,
+        hand=name, hand_mass=hand.m, hand_damping=hand.b, hand_stiffness=hand.k, link_rate=scenario.link_rate,
+        k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
+        k_t_switching=switching_limit(hand), best_delay=float(added[best]), k_t_best=float(k_t_delay[best]),
+        damping_needed=needed, delay_margin=margin, delay=added, k_t_delay=k_t_delay, **measured,
     )  # fmt: skip
 
 
@@ -136,9 +124,9 @@ def measured_limit(
 
     The error is that of the filter's response in the recordings and that of the arm's parameters, by the limits of the
     `changed` scenarios.  Without recordings the filter is the simulated one.
+    For a hand without limit, w is NaN, and its own frequency is taken.
     """
-    if not math.isfinite(w):
-        return dict.fromkeys(MEASURED, math.nan)
+    w = w if math.isfinite(w) else hand.frequency
     f = 0.5 * w / math.pi
     G, Z = felt(linear, f)
     unfiltered, _ = felt(replace(linear, filtered=False), f)
@@ -153,9 +141,9 @@ def measured_limit(
     headline = limit(H * unfiltered, Z)
     errors = [limit((H + part) * unfiltered, Z) - headline for part in (std, 1j * std) if known]
     errors += [limit(*felt(scenario, f)) - limit(G, Z) for scenario in changed]
-    lag = -float(np.angle(H)) / w
-    values = (
-        headline, math.hypot(*errors) if errors else math.nan, f, lag, std / abs(H) / w, abs(H), std,
-        delays.formula(hand, w, H * unfiltered, Z)[1], Z.imag / w,
-    )  # fmt: skip
-    return dict(zip(MEASURED, values, strict=True))
+    return {
+        "k_t_limit": headline, "k_t_limit_std": math.hypot(*errors) if errors else math.nan, "limit_frequency": f,
+        "filter_lag": -float(np.angle(H)) / w, "filter_lag_std": std / abs(H) / w, "filter_share": abs(H),
+        "filter_share_std": std, "felt_damping": Z.imag / w,
+        "loop_delay": delays.formula(hand, w, H * unfiltered, Z)[1],
+    }  # fmt: skip

@@ -57,7 +57,6 @@ from davinci_forces.records.tissue import (
     HapticRun,
     Push,
     StabilityLimit,
-    StabilityMap,
     Stiffness,
     TissueModel,
 )
@@ -71,7 +70,7 @@ __all__ = [
     "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel", "Labels", "Links",
     "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin", "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
-    "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
+    "Spectrum", "StabilityLimit", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
     "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
     "diagnostic",
 ]  # fmt: skip
@@ -84,7 +83,7 @@ KINDS: dict[str, type[Record]] = {
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
         FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        Comparison, StabilityMap, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
+        Comparison, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

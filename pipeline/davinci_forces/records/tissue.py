@@ -106,17 +106,6 @@ class TissueModel(LogRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(RobotRecord):
-    """The map of common quadratic Lyapunov functions found, over stiffnesses of hand and tissue.  Fig 8.9"""
-
-    hand_mass: float
-    hand_damping: float
-    k_h: Column
-    tissue_stiffness: Column
-    has_cqlf: Counts
-
-
-@dataclass(frozen=True, eq=False)
 class StabilityLimit(RobotRecord):
     """The largest stable tissue stiffness over the stiffness of the hand, without delay."""
 

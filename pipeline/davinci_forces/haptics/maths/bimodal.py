@@ -31,17 +31,7 @@ from davinci_forces.maths.arrays import Array
 
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 SERIES_RANGE = 1e-6  # distance of a damping ratio from 1 within which the series is used
-# Results for the thesis's hand.  They take seconds to compute and are the same in every study; tests recompute them.
 MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS = 1.0, 1e5  # [N/m] range of K_H
-K_H, K_T = (
-    np.geomspace(MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS, 30),
-    np.geomspace(0.5, 2e3, 30),
-)  # [N/m] axes of the stability map
-# For each K_H of the map, the number of K_T, from the smallest upwards, for which `lmi.cqlf_exists`.
-CQLF_COUNTS = (
-    7, 7, 8, 8, 9, 9, 10, 11, 11, 12, 13, 13, 14, 14, 15, 16, 17, 17, 18, 19, 19, 20, 21, 21, 22, 23, 23, 24, 25,
-    25,
-)  # fmt: skip
 
 
 class Hand(NamedTuple):

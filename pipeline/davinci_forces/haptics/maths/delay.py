@@ -169,12 +169,6 @@ def formula(hand: Hand, w: float, G: complex, Z: complex) -> tuple[Hand, float, 
     return moved, float(-np.angle(G) % (2.0 * np.pi)) / w, abs(G)
 
 
-def best_delay(delays: Array, limits: Array) -> tuple[float, float]:
-    """The delay [s] with the largest of the limits (N,) [N/m], and that limit; NaN for none."""
-    i = int(np.argmax(np.nan_to_num(limits)))
-    return (float(delays[i]), float(limits[i])) if limits[i] > 0.0 else (math.nan, math.nan)
-
-
 def settles(x: Array, shift: float) -> bool:
     """Test whether a hand at x (N,) settles after a release that moves its rest position by `shift` [m].
 

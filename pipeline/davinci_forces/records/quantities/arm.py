@@ -47,7 +47,6 @@ ARM = {
     "hand_stiffness": Quantity("stiffness of the hand", "N/m"),
     "k_h": Quantity("stiffness of the hand", "N/m"),
     "tissue_stiffness": Quantity("stiffness of the simulated tissue", "N/m"),
-    "has_cqlf": Quantity("1 where a common quadratic Lyapunov function was found, else 0"),
     "k_t_cqlf": Quantity("stiffest tissue for which a common quadratic Lyapunov function exists", "N/m"),
     "k_t_switching": Quantity("stiffest tissue that is stable under arbitrary switching", "N/m"),
     "link_rate": Quantity("message rate of the link", "Hz"),

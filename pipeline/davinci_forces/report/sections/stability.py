@@ -5,7 +5,7 @@ from itertools import cycle
 
 import numpy as np
 
-from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, StabilityMap, Stiffness
+from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stiffness
 from davinci_forces.report.content import (
     Band,
     Block,
@@ -14,7 +14,6 @@ from davinci_forces.report.content import (
     Line,
     OnScreen,
     Panel,
-    Points,
     Prose,
     Section,
     Table,
@@ -29,6 +28,7 @@ NORMAL_95 = 1.96  # quantile of a 95 % interval
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
 SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
 ROWS = (
+    *((f"hand_{name}", f"{name.capitalize()} of the hand", "assumed") for name in ("mass", "damping", "stiffness")),
     ("k_t_limit", "**Limit**: formula, measured filter", SAME),
     ("k_t_response", "Linear response", SAME),
     ("k_t_simulated", "Simulation", SAME),
@@ -72,35 +72,27 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
     if limit.k_t_limit != limit.k_t_limit:
         return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
     headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
-    half = NORMAL_95 * np.nan_to_num(limit.k_t_limit_std)
-    below, above = (limit.k_t_limit + side * half > stiffest.stiffness for side in (-1.0, 1.0))
-    friction = f"With the arm's friction and the tissue's damping, simulation finds {settles}."
-    if below and limit.delay_margin != 0.0:  # NaN for a hand that is stable with every delay tried
-        return Verdict("good", f"Hand “{name}”: **stable** against elastic tissue up to {headline}, above the measured "
-                       f"{tissue}. {friction}")  # fmt: skip
-    if above:
-        return Verdict("warn", f"Hand “{name}”: the limit, {headline}, does not exclude an oscillation against the "
-                       f"measured tissue, {tissue}. {friction}")  # fmt: skip
-    return Verdict("warn", f"Hand “{name}”: **not stable** against the measured tissue, {tissue}: elastic tissue may "
-                   f"have up to {headline}. {friction} A damping of the hand of {needed} would be enough.")  # fmt: skip
+    half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
+    stable = limit.k_t_limit - half > stiffest.stiffness and limit.delay_margin != 0.0  # NaN if no delay is too much
+    words = f"{'**stable** against' if stable else 'may oscillate against'} the measured tissue, {tissue}"
+    if limit.k_t_limit + half < stiffest.stiffness:
+        words = f"**not stable** against the measured tissue, {tissue}; a damping of {needed} is needed"
+    return Verdict(
+        "good" if stable else "warn",
+        f"Hand “{name}”: {words}. The limit is elastic tissue of {headline}; with friction of the arm and damping of "
+        f"the tissue, simulation finds {settles}.",
+    )
 
 
 def model(context: Context, limits: list[HandLimit]) -> str:
     """State the assumed hands, and which of the limits are the same."""
-    hands = [
-        "“{}”: {}, {} and {}".format(
-            hand_name(context, hand),
-            *context.numbers(f"stability.{hand.hand}", ("hand_mass", "hand_damping", "hand_stiffness"), 3),
-        )
-        for hand in limits
-    ]
     origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
     rows = [row for row in ((x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits) if min(row) == min(row)]
     apart = max((max(row) / min(row) - 1.0 for row in rows), default=float("nan"))
     agree = f"Here they agree within {100.0 * apart:.1f} %. " if rows else ""
     return (
         "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
-        f"spring $K_T$ on one side of its surface. The hands are assumed ({'; '.join(hands)}).{origin} The limit is "
+        f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is "
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
         "state the same limit: the formula takes the filter's lag and gain from logs, at the frequency at which the "
         "hand would oscillate; the response and the simulation contain the filter itself. "
@@ -112,9 +104,9 @@ def without_delay(context: Context) -> str:
     """Explain what the map of Lyapunov functions proves, and what it does not prove.  Fig 8.9"""
     region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
     return (
-        "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; the numerical "
-        "solutions of its linear matrix inequality (LMI) in [@stability-limits] agree. It knows neither delay nor "
-        f"sampling, and allows any switching. In {region} it proves nothing. Real tissue acts only in contact, and "
+        "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; see "
+        "[@stability-limits]. `davinci-forces stability` also solves its linear matrix inequality. It knows no "
+        f"delay and no sampling, and allows any switching. In {region} it proves nothing. Tissue acts in contact, and "
         "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$ if the force comes at once. So "
         "delay and sampling set the limit, not switching."
     )
@@ -139,7 +131,7 @@ def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiff
     """The map without delay, and the limit over an additional delay."""
     return Figure(
         "Limits of the tissue's stiffness. Left, hand of (8.10) without delay: up to which a Lyapunov function exists "
-        "(points: LMI solver; line: exact), and up to which the worst switching is stable (dashed). Right, whole loop: "
+        "(line), and up to which the worst switching is stable (dashed). Right, whole loop: "
         "the limit over an additional delay of the force, for one period of the free hand.",
         "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
         (map_panel(context, tissues), delay_panel(context, limits, tissues)),
@@ -152,10 +144,10 @@ def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiff
 def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
     """Fig 8.9 with the exact curves and the tissues."""
     beyond = "red in Fig 8.9" if context.compares_with_thesis else "no Lyapunov function"
-    marks: list[AnyMark] = [
-        mark for cells in context.catalogue.records(StabilityMap) for mark in lyapunov_marks(cells, beyond)
-    ]
+    marks: list[AnyMark] = []
     for limit in context.catalogue.records(StabilityLimit):
+        top = np.full(len(limit.k_h), limit.k_t_switching.max())
+        marks.append(Band(limit.k_h, limit.k_t_cqlf, top, beyond, "vermillion"))
         marks.append(Line(limit.k_h, limit.k_t_cqlf, "exact limit", "black", "solid"))
         marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
     return Panel(
@@ -165,21 +157,6 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
         (*marks, *tissue_lines(context, tissues)),
         x_log=True,
         y_log=True,
-    )
-
-
-def lyapunov_marks(cells: StabilityMap, beyond: str) -> tuple[AnyMark, ...]:
-    """The stiffest tissue with a Lyapunov function and the softest without, for each stiffness of the hand."""
-    k_h, stable = np.unique(cells.k_h), cells.has_cqlf == 1
-    columns = [cells.k_h == k for k in k_h]
-    top = float(cells.tissue_stiffness.max())
-    last = np.array([cells.tissue_stiffness[column & stable].max(initial=0.0) for column in columns])
-    first = np.array([cells.tissue_stiffness[column & ~stable].min(initial=top) for column in columns])
-    holds, fails = last > 0.0, first < top
-    return (
-        Band(k_h, first, np.full(len(k_h), top), beyond, "vermillion"),
-        Points(k_h[holds], last[holds], "LMI holds up to", "blue"),
-        Points(k_h[fails], first[fails], "LMI fails from", "orange"),
     )
 
 

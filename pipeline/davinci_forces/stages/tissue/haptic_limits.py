@@ -23,7 +23,6 @@ from davinci_forces.records import (
     HapticResponse,
     HapticRun,
     StabilityLimit,
-    StabilityMap,
     Stiffness,
 )
 from davinci_forces.robots.robot import Joint, Kind, Robot
@@ -44,12 +43,11 @@ def run(
     robot: Robot,
     *,
     q_tau: float,
-) -> Iterator[StabilityMap | StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:
+) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:
     """Compute the thesis's criteria; simulate the experiment of section 8.4 on the measured tissue, and its limits."""
     tissues = [tissue.stiffness for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
         return
-    yield stability_map(robot)
     yield stability_limit(robot)
     for law in (worst, at_contact):
         yield unstable_motion(robot, law)
@@ -67,13 +65,6 @@ def run(
     for name, hand in scenario.hands:
         yield limits.limits_of(scenario, name, hand, loop, recordings, changed)
         yield haptic_run(name, hand, scenario)
-
-
-def stability_map(robot: Robot) -> StabilityMap:
-    """Whether a solver found a common quadratic Lyapunov function, by stiffness of hand and tissue.  (8.10), Fig 8.9"""
-    k_h, k_t = np.repeat(bimodal.K_H, len(bimodal.K_T)), np.tile(bimodal.K_T, len(bimodal.K_H))
-    proved = np.arange(len(bimodal.K_T)) < np.array(bimodal.CQLF_COUNTS)[:, None]
-    return StabilityMap(robot.name, THESIS_HAND.m, THESIS_HAND.b, k_h, k_t, proved.ravel().astype(int))
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
@@ -130,32 +121,18 @@ def haptic_response(
     share = float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.share))
     gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness or float("nan")
     return HapticResponse(
-        robot=robot.name,
-        arm_from=arm_from,
-        tissue_stiffness=stiffness,
-        at_frequency=PALPATION_FREQUENCY,
-        rendered_stiffness=gain * share * stiffness,
-        transparency=share,
-        felt_delay=float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.late)),
-        frequency=answer.frequency,
-        felt_share=answer.share,
-        felt_late=answer.late,
-    )
+        robot=robot.name, arm_from=arm_from, tissue_stiffness=stiffness, at_frequency=PALPATION_FREQUENCY,
+        rendered_stiffness=gain * share * stiffness, transparency=share,
+        felt_delay=float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.late)), frequency=answer.frequency,
+        felt_share=answer.share, felt_late=answer.late,
+    )  # fmt: skip
 
 
 def haptic_run(name: str, hand: Hand, scenario: HapticScenario) -> HapticRun:
     """The forces that one hand feels."""
     run = haptic.experiment(scenario, hand)
     return HapticRun(
-        hand=name,
-        out_of_reach=int(run.thrown),
-        true_peak=float(run.true.max()),
-        felt_peak=float(run.felt.max()),
-        felt_error=run.error,
-        t=run.t,
-        plan_x=run.plan,
-        hand_x=run.x,
-        arm_x=run.q,
-        true_force=run.true,
+        hand=name, out_of_reach=int(run.thrown), true_peak=float(run.true.max()), felt_peak=float(run.felt.max()),
+        felt_error=run.error, t=run.t, plan_x=run.plan, hand_x=run.x, arm_x=run.q, true_force=run.true,
         felt_force=run.felt,
-    )
+    )  # fmt: skip
