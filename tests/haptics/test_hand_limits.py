@@ -73,6 +73,15 @@ def test_formula_response_and_simulation_of_the_same_loop_agree_within_5_percent
 
 
 @pytest.mark.medium
+@pytest.mark.parametrize("share", [0.5, 0.96, 1.04, 1.9])
+def test_the_limit_by_simulation_is_the_same_from_every_guess(share, loop):
+    """A hand that bounces off far stiffer tissue with a bounded amplitude is not stable."""
+    linear, (expected, _) = limits.without_friction(FULL), response_limit(THESIS_HAND, *loop)
+    assert_allclose(limits.max_settling(linear, THESIS_HAND, share * expected), expected, rtol=0.05)
+    assert not haptic.hand_settles(replace(linear, stiffness=2.0 * expected), THESIS_HAND)
+
+
+@pytest.mark.medium
 @pytest.mark.parametrize("hand", [THESIS_HAND, FIRM, MIDDLE])
 @pytest.mark.parametrize("delay", [0.0, 0.03])
 def test_with_an_ideal_arm_every_limit_is_that_of_a_held_force(hand, delay):

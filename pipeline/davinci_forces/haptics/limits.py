@@ -3,8 +3,8 @@
 The headline is the formula of a delayed force, (G K_T + Z) x, at the frequency of the hand's oscillation at the limit.
 It includes hand, link, sampling, arm and filter, and elastic tissue; the filter's lag and gain are measured in logs.
 The response and the simulation of the same loop, without friction and damping of tissue, contain the filter itself.
-They must agree with the headline.  `k_t_settles` adds the friction of the arm and the damping of the tissue; `k_t_cqlf`
-and `k_t_switching` leave out link, arm, filter, sampling and every delay, and allow switching at arbitrary times.
+They must agree with the headline.  `k_t_settles` adds the friction of the arm and the damping of the tissue.
+`k_t_cqlf` and `k_t_switching` leave out link, arm, filter, sampling and delay, and allow any switching.
 """
 
 import math
@@ -26,7 +26,6 @@ NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alo
 SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
 MAX_DELAY_MARGIN = 1.0  # [s]
 TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
-
 # Time [s], effort minus the model's, and the filter's external effort, each (N,).
 Recording = tuple[Array, Array, Array]
 # w (N,) [rad/s], and at each w G and Z [N/m].
@@ -43,7 +42,7 @@ def without_friction(scenario: HapticScenario, body: Body | None = None) -> Hapt
     return replace(scenario, body=moved, assumed_body=assumed, device=device, damping=0.0, friction=0.0)
 
 
-def felt(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
+def gain_and_impedance(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
     """G and Z [N/m] at a frequency [Hz], from simulations with and without the tissue."""
     assert scenario.stiffness is not None
     gain = scenario.device.force * scenario.device.motion
@@ -53,7 +52,7 @@ def felt(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
 
 def loop_response(scenario: HapticScenario) -> LoopResponse:
     """The response of the loop without friction; it is the same for every hand."""
-    G, Z = np.array([felt(without_friction(scenario), f) for f in FREQUENCIES.tolist()]).T
+    G, Z = np.array([gain_and_impedance(without_friction(scenario), f) for f in FREQUENCIES.tolist()]).T
     return 2.0 * np.pi * FREQUENCIES, G, Z
 
 
@@ -128,8 +127,8 @@ def measured_limit(
     """
     w = w if math.isfinite(w) else hand.frequency
     f = 0.5 * w / math.pi
-    G, Z = felt(linear, f)
-    unfiltered, _ = felt(replace(linear, filtered=False), f)
+    G, Z = gain_and_impedance(linear, f)
+    unfiltered, _ = gain_and_impedance(replace(linear, filtered=False), f)
     H, std = filter_response(recordings, f)
     known = math.isfinite(std)
     H = H if known else G / unfiltered
@@ -140,7 +139,7 @@ def measured_limit(
 
     headline = limit(H * unfiltered, Z)
     errors = [limit((H + part) * unfiltered, Z) - headline for part in (std, 1j * std) if known]
-    errors += [limit(*felt(scenario, f)) - limit(G, Z) for scenario in changed]
+    errors += [limit(*gain_and_impedance(scenario, f)) - limit(G, Z) for scenario in changed]
     return {
         "k_t_limit": headline, "k_t_limit_std": math.hypot(*errors) if errors else math.nan, "limit_frequency": f,
         "filter_lag": -float(np.angle(H)) / w, "filter_lag_std": std / abs(H) / w, "filter_share": abs(H),

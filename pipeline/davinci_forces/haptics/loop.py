@@ -93,8 +93,9 @@ def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
     push[t >= RELEASE_TIME] = PRESS_FORCE
     endless = replace(scenario, stops=(-1e3, 1e3))
     run = _run(endless, hand, push, np.zeros((_turns(scenario, ticks), 3)), 0.0)
-    gain = scenario.device.force * scenario.device.motion
-    return settles(run.x[t >= RELEASE_TIME], EXTRA_SHARE * PRESS_FORCE / (hand.k + gain * _parts(scenario)[0]))
+    gain, x = scenario.device.force * scenario.device.motion, run.x[t >= RELEASE_TIME]
+    in_contact = bool(x[len(x) // 2 :].min() > 0.0)  # a hand that bounces off may do so with a bounded amplitude
+    return in_contact and settles(x, EXTRA_SHARE * PRESS_FORCE / (hand.k + gain * _parts(scenario)[0]))
 
 
 def response(scenario: HapticScenario) -> FeltResponse:

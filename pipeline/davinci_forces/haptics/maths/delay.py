@@ -27,6 +27,7 @@ is real and positive; the limit is the smallest of these K_T.
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,8 @@ IMAGES = np.arange(-20, 20)  # n of the images, in pairs at half the rate
 RESPONSE_POINTS = 4000  # points of an interpolated frequency response
 SUSTAINED_RATIO = 0.97  # an oscillation is sustained if the amplitude ratio of successive quarters is at least this
 SEARCH_FACTOR = 64.0  # largest ratio of limit to first guess, and of guess to limit
-TRIAL_HALVINGS, DAMPING_HALVINGS = 7, 40
+SEARCH_STEP = 1.25  # ratio of successive trials: the first unstable one is sought, as stability may return beyond
+TRIAL_HALVINGS, DAMPING_HALVINGS = 5, 40
 
 
 def delay_limit(hand: Hand, delay: float) -> float:
@@ -175,8 +177,8 @@ def settles(x: Array, shift: float) -> bool:
     It settles if its motion in the last quarter is less than the shift, or if its motion decreases steadily.  The limit
     is not 0 because near rest the friction in the arm, and with it the felt force, may have any value.
     """
-    first, _, before, last = (float(np.ptp(part)) for part in np.array_split(x, 4))
-    return bool(last < shift or (last < SUSTAINED_RATIO**3 * first and last < SUSTAINED_RATIO * before))
+    parts = [float(np.ptp(part)) for part in np.array_split(x, 4)]
+    return parts[-1] < shift or all(b < SUSTAINED_RATIO * a for a, b in pairwise(parts))
 
 
 def max_stable(stable: Callable[[float], bool], guess: float) -> float:
@@ -186,12 +188,12 @@ def max_stable(stable: Callable[[float], bool], guess: float) -> float:
     """
     low = high = guess
     if stable(guess):
-        while stable(high := 2.0 * high):
+        while stable(high := SEARCH_STEP * high):
             low = high
             if high >= SEARCH_FACTOR * guess:
                 return math.nan
     else:
-        while not stable(low := 0.5 * low):
+        while not stable(low := low / SEARCH_STEP):
             high = low
             if low <= guess / SEARCH_FACTOR:
                 return math.nan

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.records import HandLimit, HapticResponse, HapticRun
+from davinci_forces.records import HapticResponse, HapticRun
 from davinci_forces.report.content import (
     Block,
     Figure,
@@ -17,11 +17,10 @@ from davinci_forces.report.content import (
     Section,
     VLine,
     VSpan,
-    literal,
 )
 from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, MS
+from davinci_forces.report.sections.parts import MM, MS, hand_name
 
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
@@ -72,11 +71,6 @@ def experiment(context: Context, responses: list[HapticResponse]) -> str:
     )
 
 
-def hand_name(context: Context, run: HapticRun | HandLimit) -> str:
-    """The name of a hand; the default hand is named after the thesis only in simulations of the thesis."""
-    return "default" if run.hand == "thesis" and not context.compares_with_thesis else literal(run.hand)
-
-
 def traces(context: Context, run: HapticRun) -> Figure:
     """Fig 8.12 of one hand: positions above, forces below, contact shaded."""
     few = slice(None, None, max(len(run) // SAMPLES_DRAWN, 1))
@@ -84,8 +78,8 @@ def traces(context: Context, run: HapticRun) -> Figure:
     shaded = tuple(spans(run))
     ends = " The run ends where the hand leaves the device's reach." if run.out_of_reach else ""
     return Figure(
-        f"Simulated, hand “{hand_name(context, run)}” in and out of the tissue, contact shaded. Positions from the "
-        "surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
+        f"Simulated, hand “{hand_name(context, run.hand)}” in and out of the tissue, contact shaded. Positions from "
+        "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
         f"force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",

@@ -21,8 +21,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, label
-from davinci_forces.report.sections.haptics import hand_name
-from davinci_forces.report.sections.parts import MS, THESIS_TISSUE
+from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name
 
 NORMAL_95 = 1.96  # quantile of a 95 % interval
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
@@ -57,7 +56,7 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     """The section's content.  Section 8.3"""
     tissues = [tissue for tissue in context.catalogue.records(Stiffness) if tissue.pushes and tissue.stiffness > 0.0]
-    yield from (verdict(context, limit, tissues) for limit in limits)
+    yield from (verdict(context, limit, tissues) for limit in limits if tissues)
     yield Prose(f"{model(context, limits)}\n\n{without_delay(context)}")
     yield limits_table(context, limits)
     yield limits_figure(context, limits, tissues)
@@ -66,7 +65,7 @@ def blocks(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
 
 def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Verdict:
     """Whether a hand is stable against the stiffest measured tissue: the headline and its interval."""
-    key, name = f"stability.{limit.hand}", hand_name(context, limit)
+    key, name = f"stability.{limit.hand}", hand_name(context, limit.hand)
     stiffest = max(tissues, key=lambda tissue: tissue.stiffness)
     tissue = context.number(f"tissue.{stiffest.log}.stiffness")
     if limit.k_t_limit != limit.k_t_limit:
@@ -87,9 +86,9 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
 def model(context: Context, limits: list[HandLimit]) -> str:
     """State the assumed hands, and which of the limits are the same."""
     origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
-    rows = [row for row in ((x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits) if min(row) == min(row)]
-    apart = max((max(row) / min(row) - 1.0 for row in rows), default=float("nan"))
-    agree = f"Here they agree within {100.0 * apart:.1f} %. " if rows else ""
+    rows = [(x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits]
+    apart = [max(row) / min(row) - 1.0 for row in rows if np.isfinite(row).all()]
+    agree = f"Here they agree within {100.0 * max(apart):.1f} %. " if apart else ""
     return (
         "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
         f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is "
@@ -120,7 +119,7 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
         "Limits of the tissue's stiffness, and what they follow from. The standard error of the first includes those "
         "of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's parameters. A dash marks "
         "a limit that was not found, or an error that is not known. No setting is changed.",
-        ("Stiffest stable tissue", *(hand_name(context, limit) for limit in limits), "Includes"),
+        ("Stiffest stable tissue", *(hand_name(context, limit.hand) for limit in limits), "Includes"),
         rows,
         "stability-table",
         "l" + "r" * len(limits) + "l",
@@ -131,8 +130,7 @@ def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiff
     """The map without delay, and the limit over an additional delay."""
     return Figure(
         "Limits of the tissue's stiffness. Left, hand of (8.10) without delay: up to which a Lyapunov function exists "
-        "(line), and up to which the worst switching is stable (dashed). Right, whole loop: "
-        "the limit over an additional delay of the force, for one period of the free hand.",
+        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
         "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
         (map_panel(context, tissues), delay_panel(context, limits, tissues)),
         "stability-limits",
@@ -173,7 +171,9 @@ def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffne
     marks: list[AnyMark] = []
     for limit, colour in zip(limits, cycle(COLOURS), strict=False):
         known = limit.k_t_delay > 0.0
-        marks.append(Line(MS * limit.delay[known], limit.k_t_delay[known], hand_name(context, limit), colour, "solid"))
+        marks.append(
+            Line(MS * limit.delay[known], limit.k_t_delay[known], hand_name(context, limit.hand), colour, "solid")
+        )
     marks += tissue_lines(context, tissues)
     return Panel("Whole loop", "additional delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)
 
