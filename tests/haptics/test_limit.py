@@ -6,13 +6,19 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand, switching_limit
 from davinci_forces.haptics.maths.lmi import cqlf_exists
-from davinci_forces.records import Comparison, HandLimit, HapticMotion, StabilityLimit, Stiffness
+from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
+from davinci_forces.records import Comparison, FilterNoise, HandLimit, HapticMotion, StabilityLimit, Stiffness
 from davinci_forces.robots import davinci
 from davinci_forces.stages.tissue import haptic_limits
 from davinci_forces.study import HapticScenario
 
 K = 457.24
 SCENARIO = HapticScenario(hands=(("one", Hand(1.0, 10.0, 300.0)),), plan=((0.0, -0.01), (1.0, 0.01), (2.0, -0.01)))
+NOISE = FilterNoise(
+    **dict.fromkeys(FilterNoise.scalars(), 1.0)
+    | {"joint": "instrument_slide", "logs": ("a",), "inertia": SLIDE.inertia, "viscous": SLIDE.viscous}
+    | {f"r_{name}": value for name, value in SLIDE_NOISE._asdict().items()}
+)
 MEASURED = (
     ("direct", "instrument_slide", 0.0), ("ekf", "instrument_slide", 0.05), ("rts", "instrument_slide", 0.0),
     ("direct", "hand_roll", 0.0), ("ekf", "hand_roll", 0.2),
@@ -36,7 +42,7 @@ def comparison(label, joint="instrument_slide", log="a", delay=0.0) -> Compariso
 
 
 def made(tissues, comparisons=()) -> list:
-    return list(haptic_limits.run(tissues, comparisons, (), (), SCENARIO, davinci.ROBOT, q_tau=0.0))
+    return list(haptic_limits.run(tissues, comparisons, (), [NOISE], SCENARIO, davinci.ROBOT, q_tau=0.0))
 
 
 def only(records, kind):

@@ -24,22 +24,28 @@ from davinci_forces.records import HandLimit
 
 NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alone
 SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
+NO_STEP = np.zeros(1)  # of an encoder
 MAX_DELAY_MARGIN = 1.0  # [s]
 TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
-# Time [s], effort minus the model's, and the filter's external effort, each (N,).
+# Time [s], the response of the filter at rest to the effort minus the model's, and its external effort, each (N,).
 Recording = tuple[Array, Array, Array]
 # w (N,) [rad/s], and at each w G and Z [N/m].
 LoopResponse = tuple[Array, Complex, Complex]
 
 
 def without_friction(scenario: HapticScenario, body: Body | None = None) -> HapticScenario:
-    """The scenario with elastic tissue and a body without friction, which the filter assumes; or with another body."""
+    """The linear scenario: elastic tissue, no friction, also in the filter, no encoder steps; or with another body."""
     moved, assumed = (
         x._replace(coulomb=(0.0, 0.0), static=(0.0, 0.0), bristle_stiffness=0.0, bristle_damping=0.0)
         for x in (body or scenario.body or SLIDE, scenario.assumed_body or scenario.body or SLIDE)
     )
-    device = scenario.device._replace(strongest=math.inf, step=0.0)
-    return replace(scenario, body=moved, assumed_body=assumed, device=device, damping=0.0, friction=0.0)
+    device, motor = (
+        scenario.device._replace(strongest=math.inf, step=0.0),
+        scenario.motor._replace(encoder_step=NO_STEP),
+    )
+    return replace(
+        scenario, body=moved, assumed_body=assumed, device=device, motor=motor, damping=0.0, friction=0.0
+    )  # fmt: skip
 
 
 def gain_and_impedance(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
@@ -57,17 +63,17 @@ def loop_response(scenario: HapticScenario) -> LoopResponse:
 
 
 def filter_response(recordings: Sequence[Recording], frequency: float) -> tuple[complex, float]:
-    """The filter's gain and phase at a frequency [Hz] in logs, and the standard error of its real or imaginary part.
+    """The filter's response in logs over that at rest, at a frequency [Hz], and the error of either part.
 
-    The gain is that of least squares over segments of a Hann window: sum Y conj(X) / sum |X|^2.  Its error is the
+    It is that of least squares over segments of a Hann window, sum Y conj(X) / sum |X|^2.  The standard error is the
     jackknife's over segments.  NaN with few segments.
     """
     cross, power = [], []
-    for t, effort, filtered in recordings:
+    for t, at_rest, filtered in recordings:
         n = round(SEGMENT_PERIODS / frequency / float(t[1] - t[0]))
         wave = np.exp(-2j * np.pi * frequency * t[:n]) * np.hanning(n)
         for start in range(0, len(t) - n + 1, n):
-            X, Y = (np.sum(wave * (x[start : start + n] - x[start : start + n].mean())) for x in (effort, filtered))
+            X, Y = (np.sum(wave * (x[start : start + n] - x[start : start + n].mean())) for x in (at_rest, filtered))
             cross.append(Y * np.conj(X))
             power.append(abs(X) ** 2)
     if len(power) < MIN_SEGMENTS:
@@ -129,9 +135,9 @@ def measured_limit(
     f = 0.5 * w / math.pi
     G, Z = gain_and_impedance(linear, f)
     unfiltered, _ = gain_and_impedance(replace(linear, filtered=False), f)
-    H, std = filter_response(recordings, f)
-    known = math.isfinite(std)
-    H = H if known else G / unfiltered
+    H, (ratio, error) = G / unfiltered, filter_response(recordings, f)
+    known = math.isfinite(error)
+    H, std = H * ratio if known else H, error * abs(H)
 
     def limit(G: complex, Z: complex) -> float:
         moved, delay, share = delays.formula(hand, w, G, Z)

@@ -79,8 +79,8 @@ def traces(context: Context, run: HapticRun) -> Figure:
     ends = " The run ends where the hand leaves the device's reach." if run.out_of_reach else ""
     return Figure(
         f"Simulated, hand “{hand_name(context, run.hand)}” in and out of the tissue, contact shaded. Positions from "
-        "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
-        f"force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
+        "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the "
+        f"felt force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",
         (

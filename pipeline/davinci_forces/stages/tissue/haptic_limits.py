@@ -4,6 +4,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from davinci_forces.filters import DEFAULT, tracker
+from davinci_forces.filters.problem import stationary_joint
+from davinci_forces.filters.response import noise_model
 from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
@@ -53,13 +56,13 @@ def run(
         yield unstable_motion(robot, law)
     joint = next((joint for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort), None)
     bodies, arm_from = moving_bodies(robot, fits, joint)
-    joint_noises = (AxisNoise(n.r_q, n.r_dq, n.r_tau) for n in noises if joint and n.joint == joint.name)
-    noise = next(joint_noises, SLIDE_NOISE)
+    tuned = next((noise for noise in noises if joint and noise.joint == joint.name), None)
+    noise = SLIDE_NOISE if tuned is None else AxisNoise(tuned.r_q, tuned.r_dq, tuned.r_tau)
     scenario = haptic.complete_scenario(
         haptics, bodies[0], noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0)
     )
     answer, loop = haptic.response(scenario), limits.loop_response(scenario)
-    recordings = filtered_recordings(comparisons, joint.name if joint else "")
+    recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
     changed = () if haptics.body else bodies[1:]
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
@@ -85,11 +88,16 @@ def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
     return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS_HAND, k_t, motion.x, motion.dx))
 
 
-def filtered_recordings(comparisons: Iterable[Comparison], joint: str) -> list[limits.Recording]:
-    """The joint's logs with the effort minus the model's, and with the default filter's external effort."""
-    of_joint = [comparison for comparison in comparisons if comparison.joint == joint]
+def filtered_recordings(
+    comparisons: Iterable[Comparison], joint: Joint, tuned: FilterNoise, q_tau: float
+) -> Iterator[limits.Recording]:
+    """The joint's logs with the default filter's external effort, and with its response to the direct one at rest."""
+    of_joint = [comparison for comparison in comparisons if comparison.joint == joint.name]
     direct = {comparison.log: comparison.tau_ext for comparison in of_joint if comparison.filter == "direct"}
-    return [(c.t, direct[c.log], c.tau_ext) for c in of_joint if c.default and c.log in direct]
+    for c in (c for c in of_joint if c.default and c.log in direct):
+        T_s, inertia = float(c.t[1] - c.t[0]), np.full(len(c.t), tuned.inertia)
+        at_rest = stationary_joint(inertia, tuned.viscous, direct[c.log], T_s, tuned.r_tau)
+        yield c.t, tracker(DEFAULT)(at_rest, noise_model(tuned, joint, T_s, q_tau)).tau_ext, c.tau_ext
 
 
 def moving_bodies(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Sequence[Body], str]:
