@@ -67,15 +67,13 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
         run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, name, hand, loop)
         if csv is not None:
             _write_csv(csv / f"{name}.csv", run)
+        numbers = [key for key in found.scalars() if not key.startswith(("hand", "link"))]
         hands[name] = {
-            "m": hand.m,
-            "b_h": hand.b,
-            "k_h": hand.k,
-            "true_peak": float(run.true.max()),
-            "felt_peak": float(run.felt.max()),
-            "felt_error": run.error,
+            "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": float(run.true.max()),
+            "felt_peak": float(run.felt.max()), "felt_error": run.error,
             "out_of_reach": float(run.t[-1]) if run.thrown else None,
-        } | {key: _known(getattr(found, key)) for key in found.scalars() if not key.startswith(("hand", "link"))}
+            **{key: _known(getattr(found, key)) for key in numbers},
+        }  # fmt: skip
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}
@@ -116,8 +114,7 @@ def _format_text(answer: Answer) -> str:
             f"{_quantity(hand['k_t_simulated'], 'N/m')} in simulation",
             f"  with the arm's friction and damping of tissue: {_quantity(hand['k_t_settles'], 'N/m')} in simulation",
             f"  {_quantity(hand['k_t_best'], 'N/m')} with the best additional delay, {hand['best_delay'] or 0:.3g} s; "
-            f"against this tissue the response asks for a damping of {hand['damping_needed']:.3g} N s/m; no setting is "
-            "changed",
+            f"damping needed for this tissue: {hand['damping_needed']:.3g} N s/m; no setting is changed",
             f"  additional delay until unstable: {_quantity(hand['delay_margin'], 's')}",
         ]
     return "\n".join(lines)

@@ -24,7 +24,6 @@ from davinci_forces.records import HandLimit
 
 NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alone
 SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
-NO_STEP = np.zeros(1)  # of an encoder
 MAX_DELAY_MARGIN = 1.0  # [s]
 TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
 # Time [s], the response of the filter at rest to the effort minus the model's, and its external effort, each (N,).
@@ -39,12 +38,9 @@ def without_friction(scenario: HapticScenario, body: Body | None = None) -> Hapt
         x._replace(coulomb=(0.0, 0.0), static=(0.0, 0.0), bristle_stiffness=0.0, bristle_damping=0.0)
         for x in (body or scenario.body or SLIDE, scenario.assumed_body or scenario.body or SLIDE)
     )
-    device, motor = (
-        scenario.device._replace(strongest=math.inf, step=0.0),
-        scenario.motor._replace(encoder_step=NO_STEP),
-    )
     return replace(
-        scenario, body=moved, assumed_body=assumed, device=device, motor=motor, damping=0.0, friction=0.0
+        scenario, body=moved, assumed_body=assumed, damping=0.0, friction=0.0, motor=scenario.motor._replace(
+        encoder_step=np.zeros(1)), device=scenario.device._replace(strongest=math.inf, step=0.0),
     )  # fmt: skip
 
 

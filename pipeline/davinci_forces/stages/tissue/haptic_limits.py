@@ -38,15 +38,9 @@ FROM_FILE, FROM_THESIS = "the scenario", "the thesis"
 
 
 def run(
-    stiffnesses: Iterable[Stiffness],
-    comparisons: Iterable[Comparison],
-    fits: Iterable[Fit],
-    noises: Iterable[FilterNoise],
-    haptics: HapticScenario,
-    robot: Robot,
-    *,
-    q_tau: float,
-) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:
+    stiffnesses: Iterable[Stiffness], comparisons: Iterable[Comparison], fits: Iterable[Fit],
+    noises: Iterable[FilterNoise], haptics: HapticScenario, robot: Robot, *, q_tau: float,
+) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:  # fmt: skip
     """Compute the thesis's criteria; simulate the experiment of section 8.4 on the measured tissue, and its limits."""
     tissues = [tissue.stiffness for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
@@ -63,10 +57,9 @@ def run(
     )
     answer, loop = haptic.response(scenario), limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
-    changed = () if haptics.body else bodies[1:]
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
-        yield limits.limits_of(scenario, name, hand, loop, recordings, changed)
+        yield limits.limits_of(scenario, name, hand, loop, recordings, () if haptics.body else bodies[1:])
         yield haptic_run(name, hand, scenario)
 
 
@@ -94,7 +87,7 @@ def filtered_recordings(
     """The joint's logs with the default filter's external effort, and with its response to the direct one at rest."""
     of_joint = [comparison for comparison in comparisons if comparison.joint == joint.name]
     direct = {comparison.log: comparison.tau_ext for comparison in of_joint if comparison.filter == "direct"}
-    for c in (c for c in of_joint if c.default and c.log in direct):
+    for c in (c for c in of_joint if c.default and c.log in direct and len(c.t) > 1):
         T_s, inertia = float(c.t[1] - c.t[0]), np.full(len(c.t), tuned.inertia)
         at_rest = stationary_joint(inertia, tuned.viscous, direct[c.log], T_s, tuned.r_tau)
         yield c.t, tracker(DEFAULT)(at_rest, noise_model(tuned, joint, T_s, q_tau)).tau_ext, c.tau_ext
