@@ -6,7 +6,14 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
-from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit, zero_order_hold
+from davinci_forces.haptics.maths.delay import (
+    damping_needed,
+    delay_limit,
+    max_stable,
+    sampled_limit,
+    settles,
+    zero_order_hold,
+)
 
 DELAYS = (0.005, 0.05, 0.3)
 
@@ -66,3 +73,17 @@ def test_the_damping_that_is_needed_puts_the_limit_at_the_tissue(delay):
 def test_a_delay_of_too_many_samples_is_refused_with_a_remedy():
     with pytest.raises(BadRequest, match=r"20 s is 20000 samples of 1000 Hz.*leave the rate out"):
         sampled_limit(THESIS_HAND, 20.0, 1000.0)
+
+
+def test_the_search_finds_the_first_instability_and_not_the_end_of_an_island_beyond():
+    for guess in (0.6, 0.97, 1.3):
+        assert_allclose(max_stable(lambda value: value < 1.0 or 1.9 < value < 2.1, guess), 1.0, rtol=0.005)
+    assert np.isnan(max_stable(lambda value: True, 1.0))
+    assert np.isnan(max_stable(lambda value: False, 1.0))
+
+
+def test_a_swing_that_grows_and_shrinks_does_not_settle_and_one_that_shrinks_does():
+    wave = np.tile([-1.0, 1.0], 250)
+    for sizes, steady in (((0.6, 0.51, 0.56, 0.5), False), ((0.6, 0.56, 0.53, 0.5), True), ((9, 9, 9, 0.01), True)):
+        x = np.concatenate([size * wave for size in sizes])
+        assert settles(x, 0.1) == steady
