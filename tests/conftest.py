@@ -29,6 +29,8 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 BESIDE = ROOT.parent / "shared" / "data"
 BENCHMARKS = HERE / "benchmarks"
+# An arm whose friction the models describe (`matched`), and the same arm with another friction (`realistic`).
+TWO_FRICTIONS = str(HERE / "simulation" / "two-frictions.toml")
 
 # Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
 # itself, with `@pytest.mark.medium`.

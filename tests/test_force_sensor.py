@@ -18,6 +18,7 @@ from davinci_forces.simulation.scenario import reading as scenario
 from davinci_forces.simulation.scenario.scenario import ForceSensor
 from davinci_forces.stages.tip import sense
 from davinci_forces.study import Source
+from tests.conftest import TWO_FRICTIONS
 from tests.test_averaging import entry
 from tests.test_tip import NAMES, PUSH, RATE, STD, T, efforts, noise, run, tracks
 
@@ -162,7 +163,7 @@ def test_samples_near_a_singular_pose_are_not_judged():
 def simulated(tmp_path_factory) -> Path:
     """The arm of the demonstration, pushed at its tip, with a sensor there: identified, tracked and compared."""
     home = tmp_path_factory.mktemp("sensor")
-    demo = scenario.load("davinci-demo")
+    demo = scenario.load(TWO_FRICTIONS)
     names = {f"matched-{joint}-{kind}" for joint in ("roll", "pitch", "slide") for kind in ("excitation", "validation")}
     logs = tuple(log for log in demo.logs if log.name in names)
     [pushed] = [log for log in demo.logs if log.name == LOG]
@@ -177,7 +178,7 @@ def test_a_simulated_sensor_gives_the_error_the_lag_and_the_coverage_that_were_s
     """Error and coverage are those of the estimate against the true force as late as the sensor, and its noise."""
     made = {axis: store.read(SensorForce, simulated, Path("sensor_force", LOG, f"{axis}.parquet")) for axis in AXES}
     force = store.read(TipForce, simulated, Path("tip_force", f"{LOG}.parquet"))
-    [log] = [log for log in scenario.load("davinci-demo").logs if log.name == LOG]
+    [log] = [log for log in scenario.load(TWO_FRICTIONS).logs if log.name == LOG]
     true = sum(np.outer(push.effort_at(force.t - LAG), np.array(push.direction)) for push in log.tip)
     judged = (force.t >= 1.0) & (force.near_singular == 0)
     squares = 0.0

@@ -292,9 +292,5 @@ def test_without_their_names_motion_and_effort_tell_the_roles_of_the_demonstrati
     """A mass changes the effort as a drift does, and tissue is a contact: without a name, no more can be known."""
     alike = {"tissue": "contact", "weight": "validation"}
     expected = {entry.files[0]: alike.get(entry.role, entry.role) for entry in reading.read(DEMO).logs}
-    identifying = [file for file, role in expected.items() if role == "identification"]
-    roles = demonstration(tmp_path, neutral=True)
-    swapped = {file: file.replace("matched", "realistic") for file in identifying}
-    for file, twin in swapped.items():  # of two logs of one path, either identifies, and the other tests
-        assert {roles.pop(file), roles.pop(twin)} == {"identification", "validation"}
-    assert roles == {file: role for file, role in expected.items() if file in roles}
+    expected["slide_excitation.tdms"] = "validation"  # its motion stays within that of arm_excitation
+    assert demonstration(tmp_path, neutral=True) == expected

@@ -12,6 +12,7 @@ from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.study_folder import record_channels
 from davinci_forces.stages.model import fit
 from davinci_forces.stages.recordings import average, differentiate, resample
+from tests.conftest import TWO_FRICTIONS
 from tests.test_averaging import entry
 
 SEEDS = range(20)  # chosen before the first run
@@ -51,7 +52,7 @@ def fitted(scenario, runs) -> list[Fit]:
     return [r for r in fit.run(trajectories, motions, scenario.robot, lowpass=LOWPASS) if isinstance(r, Fit)]
 
 
-@pytest.fixture(scope="module", params=["davinci-demo", "davinci-thesis"])
+@pytest.fixture(scope="module", params=[TWO_FRICTIONS, "davinci-thesis"], ids=["two-frictions", "davinci-thesis"])
 def errors(request) -> dict[str, np.ndarray]:
     """Errors of the parameters over their standard errors, (seeds, parameters) of each estimator."""
     scenario = load(request.param)

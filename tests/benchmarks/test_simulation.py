@@ -8,6 +8,7 @@ import pytest
 
 from davinci_forces.simulation.motion import simulate_log
 from davinci_forces.simulation.scenario.reading import load
+from tests.conftest import TWO_FRICTIONS
 
 AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 
@@ -26,7 +27,7 @@ def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(n
 
 def _problem(name):
     """The scenario, read anew, and its log, made a minute long."""
-    scenario = load("davinci-demo")
+    scenario = load(TWO_FRICTIONS)
     return scenario, replace(next(log for log in scenario.logs if log.name == name), duration=60.0, lead=0.0)
 
 

@@ -1,8 +1,9 @@
-"""A study of bags that hold what the demonstration study recorded gives that study's results."""
+"""A study of bags that hold what a simulated study recorded gives that study's results."""
 
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,23 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces.cli import app
-from tests.conftest import ROOT
+from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario.reading import load
+from tests.conftest import TWO_FRICTIONS
 from tests.logs.bag_writer import joint_state, write
 
-DEMO = ROOT / "raw" / "davinci-demo"
 LOGS = ("matched-roll-excitation", "matched-roll-validation", "matched-roll-contact", "matched-slide-excitation")
 BAGS = dict(zip(LOGS, ("one.bag", "two", "three_mcap", "four.bag"), strict=True))
 TOLERANCE = 1e-6  # relative; times are rounded to nanoseconds
 
 
-def entries() -> dict[str, str]:
-    """The text of each [[log]] of the demonstration study that is used here."""
-    _, *tables = re.split(r"^\[\[log\]\]\n", (DEMO / "study.toml").read_text(), flags=re.M)
-    by_name = {re.search(r'name = "(.*)"', table)[1]: table for table in tables}
-    return {name: by_name[name] for name in LOGS}
+def simulated(folder: Path) -> dict[str, str]:
+    """The text of each [[log]] of a study that is simulated in the folder."""
+    scenario = load(TWO_FRICTIONS)
+    logs = tuple(log for log in scenario.logs if log.name in LOGS)
+    study_folder.write(replace(scenario, logs=logs), folder, False, lambda _: None)
+    _, *tables = re.split(r"^\[\[log\]\]\n", (folder / "study.toml").read_text(), flags=re.M)
+    return {re.search(r'name = "(.*)"', table)[1]: table for table in tables}
 
 
 def study(folder: Path, tables: dict[str, str]) -> Path:
@@ -43,13 +47,13 @@ def results(folder: Path) -> dict[str, float]:
 
 @pytest.mark.slow
 def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
-    tables = entries()
+    tables = simulated(tmp_path / "simulated")
     whole = study(tmp_path / "raw" / "whole", {n: re.sub(r"skip = .*\n", "", t) for n, t in tables.items()})
     original = study(tmp_path / "raw" / "original", tables)
     for table in tables.values():
         file = re.search(r'file = "(.*)"', table)[1]
         for folder in (whole, original):
-            shutil.copy(DEMO / file, folder)
+            shutil.copy(tmp_path / "simulated" / file, folder)
     assert davinci_forces.run(whole, "ingest", quiet=True)
     of_bags = {}
     for name, table in tables.items():

@@ -16,6 +16,7 @@ from davinci_forces.simulation.motion import SimulatedRun, simulate_log, theta
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.study_folder import contact_times
+from tests.conftest import TWO_FRICTIONS
 
 G = 9.81
 SLIDE = "instrument_slide"
@@ -23,7 +24,7 @@ SLIDE = "instrument_slide"
 
 @cache
 def scenario() -> Scenario:
-    return load("davinci-demo")
+    return load(TWO_FRICTIONS)
 
 
 def log(name: str, **changes) -> SimulatedLog:

@@ -3,6 +3,7 @@
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.sensors import record_force
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
+from tests.conftest import TWO_FRICTIONS
 from tests.test_study import ANYTHING, places_of
 
 LISTED = ", ".join(robots.ROBOTS)
@@ -37,6 +39,7 @@ duration = 10.0
 moves.hand_roll = { period = 5.0, a = [0.1], b = [0.0] }
 external.hand_roll = [ { shape = "triangle", start = 2.0, end = 4.0, peak = 1.0 } ]
 """
+TWO_ARMS = File(TWO_FRICTIONS).read_text(encoding="utf-8")
 
 
 def shipped_text(name: str) -> str:
@@ -144,7 +147,7 @@ def test_two_logs_of_one_name_or_file_are_refused(tmp_path):
     ],
 )
 def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
-    text = shipped_text("davinci-demo")
+    text = TWO_ARMS
     assert old in text
     found = problems(tmp_path, text.replace(old, new))
     assert any(says in problem for problem in found), found
@@ -153,7 +156,7 @@ def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
 
 
 def test_the_force_at_the_tip_may_be_recorded_late_and_with_noise(tmp_path):
-    text = shipped_text("davinci-demo")
+    text = TWO_ARMS
     line = 'file = "tip_contact.tdms"'
     whole = read(tmp_path, text.replace(line, f"{line}\nsensor = {{ noise = 0.1, lag = 0.02 }}"))
     sensors = {log.name: log.sensor for log in whole.logs if log.sensor}
@@ -167,7 +170,7 @@ def test_the_force_at_the_tip_may_be_recorded_late_and_with_noise(tmp_path):
 
 
 def test_a_log_that_starts_beyond_a_stop_is_said_where_it_says_so(tmp_path):
-    text = shipped_text("davinci-demo")
+    text = TWO_ARMS
     found = problems(tmp_path, text.replace("stops = [-0.09, 0.13]", "stops = [0.05, 0.13]"))
     assert found
     for problem in found:
@@ -184,7 +187,7 @@ def test_a_robot_whose_links_are_not_known_cannot_be_simulated_as_a_whole(monkey
 
 
 def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
-    text = shipped_text("davinci-demo")
+    text = TWO_ARMS
     start, end = text.index("[arm.control]"), text.index("[family.matched.hand_roll]")
     pid = 'law = "pid"\nproportional = [1, 2, 3]\nderivative = [4, 5, 6]\nintegral = [0, 0, 0]\ngravity = 0.9\n'
     law = read(tmp_path, text[:start] + "[arm.control]\n" + pid + text[end:]).arm.control
@@ -194,7 +197,7 @@ def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
 
 
 def test_a_family_may_give_a_log_another_role():
-    roles = {log.name: log.role for log in load("davinci-demo").logs}
+    roles = {log.name: log.role for log in load(TWO_FRICTIONS).logs}
     assert roles["matched-roll-excitation"] == "identification"
     assert roles["realistic-roll-excitation"] == "validation"
 

@@ -1,7 +1,7 @@
 """Tissue that a simulated arm pushes into, felt by its motor currents alone: of both families, over seeds."""
 
 import re
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from davinci_forces.runner.runs import folders
 from davinci_forces.simulation import study_folder
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.study import reading
+from tests.conftest import TWO_FRICTIONS
 from tests.tissue.pushing import SURFACE, K
 
 SEEDS = 5
@@ -21,8 +22,8 @@ LOGS = r'name = "(slide-excitation|tissue-approach|tissue-haptic)"'
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """The tissue of every seed: what the demonstration study has of the slide, simulated anew and analysed."""
-    text = (files("davinci_forces.simulation") / "shipped" / "davinci-demo.toml").read_text()
+    """The tissue of every seed: the logs of the slide, simulated anew and analysed."""
+    text = Path(TWO_FRICTIONS).read_text()
     head, *logs = re.split(r"(?m)^\[\[log\]\]\n", text)
     kept = head + "".join(f"[[log]]\n{log}" for log in logs if re.match(LOGS, log))
     home, tissue = tmp_path_factory.mktemp("arm"), []

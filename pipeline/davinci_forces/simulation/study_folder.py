@@ -3,7 +3,7 @@
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedRun, mass_position, simulate_log, theta
-from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
+from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
 TRUTH = "truth.toml"
@@ -66,7 +66,9 @@ def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str
 def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
     """Record the channels of one log, with the noise of the scenario's seed."""
     channels = [SimulatedChannel("time", "Time", "s", run.t)] if log.clock == "channel" else []
-    for name, motion in run.motions.items():
+    late = generator(scenario.seed, log.name, "clock").normal(0.0, scenario.clock_jitter, len(run.t))
+    for name, true in run.motions.items():
+        motion = true.at(run.t, run.t + late) if scenario.clock_jitter else true
         random = generator(scenario.seed, log.name, name)
         noise = scenario.arm.families[log.family].noise[name] if scenario.arm else scenario.joints[name].noise
         channels += record(scenario.joints[name], motion, noise, scenario.rate, log.current_unit, random)
@@ -82,6 +84,7 @@ def _text(file: Path, text: str) -> None:
 def study_text(scenario: Scenario, entries: Sequence[str]) -> str:
     """The text of study.toml."""
     head = f"title = {toml(scenario.title)}\nrobot = {toml(scenario.robot.name)}\nsimulated = true\n"
+    head += f"\n[settings]\nharmonics = {scenario.harmonics}\n" if scenario.harmonics else ""
     return "# Written by `davinci-forces simulate`: simulated data.\n" + "\n".join([head, *entries])
 
 
@@ -115,18 +118,25 @@ def toml(value: object) -> str:
 
 
 def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
-    """The text of truth.toml: parameters and noise of each joint, for each family if there are any, then the logs."""
+    """The text of truth.toml: what was put into each joint, for each family if there are any; then the logs."""
     lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
     lines += [f"scenario = {toml(scenario.name)}", f"seed = {scenario.seed}"]
+    lines += [f"clock_jitter = {scenario.clock_jitter}"] * (scenario.clock_jitter > 0.0)
     if scenario.arm is None:
         lines += _theta("theta", scenario, {name: np.array(j.theta) for name, j in scenario.joints.items()})
         for name, simulated in scenario.joints.items():
-            lines += _noise(f"noise.{name}", simulated.noise)
+            lines += _table(f"noise.{name}", vars(simulated.noise))
     else:
         for name, family in scenario.arm.families.items():
             lines += _theta(f"theta.{name}", scenario, theta(scenario, name))
-            for joint, noise in family.noise.items():
-                lines += _noise(f"noise.{name}.{joint}", noise)
+            for i, (joint, noise) in enumerate(family.noise.items()):
+                lines += _table(f"noise.{name}.{joint}", vars(noise))
+                friction = {key: float(values[i]) for key, values in family.friction._asdict().items()}
+                lines += _table(f"friction.{name}.{joint}", friction)
+        motors = scenario.arm.motors
+        drives = {"rotor_inertia": scenario.arm.rotors, "inductance": motors.inductance}
+        limits = {"current_limit": motors.current_limit, "voltage_limit": motors.voltage_limit}
+        lines += _table("motors", {key: values.tolist() for key, values in (drives | limits).items()})
     return "\n".join([*lines, "", *entries])
 
 
@@ -165,8 +175,8 @@ def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.floa
     return lines
 
 
-def _noise(place: str, noise: SensorNoise) -> list[str]:
-    return ["", f"[{place}]", *(f"{key} = {toml(value)}" for key, value in vars(noise).items())]
+def _table(place: str, values: Mapping[str, object]) -> list[str]:
+    return ["", f"[{place}]", *(f"{key} = {toml(value)}" for key, value in values.items())]
 
 
 def _push(push: SimulatedPush) -> list[str]:

@@ -143,8 +143,9 @@ def _by_motion(
             roles[i] = Role("friction", "its joint moves at one constant velocity after another")
         elif not holding.repeats and not excited[i] and set(spans) - set(reach):
             late.append(i)
-        elif any(span > WIDER * reach.get(joint, (0.0, ""))[0] for joint, span in spans.items()) and (
-            holding.repeats or excited[i]
+        elif (excited[i] and any(tested)) or (
+            any(span > WIDER * reach.get(joint, (0.0, ""))[0] for joint, span in spans.items())
+            and (holding.repeats or excited[i])
         ):
             roles[i] = Role("identification", '"excitation" in its name' if excited[i] else "its motion repeats")
             _cover(reach, recordings[i])

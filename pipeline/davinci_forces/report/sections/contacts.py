@@ -22,14 +22,14 @@ def blocks(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(
-            "A contact is measured on each joint that moves during the contact. The study states its window, or the "
-            "window is the time in which the external effort, the smoother's, exceeds the alarm level. Free motion "
-            "crosses this level at most once in ten minutes. Each contact has an onset, a release, a peak (the largest "
-            "external effort), a mean and an impulse (effort times time). The standard error of each "
+            "A contact is measured on each joint that moves in the log, or on which one is found. The study states its "
+            "window, or it is the time in which the external effort, the smoother's, exceeds the alarm level. Free "
+            "motion crosses this level at most once in ten minutes. Each contact has an onset, a release, a peak (the "
+            "largest external effort), a mean and an impulse (effort times time). The standard error of each "
             "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
             "includes the smoother's standard deviation at that peak, and what the smoother rounds off it. A contact "
             "is detected if its peak exceeds the joint's detection level: 99 % of the samples of the joint's worst run "
-            "in free space stay below this level." + simulated_friction(context)
+            "in free space stay below this level."
         )
         yield peaks(contacts)
         yield from paper_or_screen(
@@ -50,16 +50,6 @@ def blocks(context: Context) -> Iterator[Block]:
             unused,
             "not-analysed",
         )
-
-
-def simulated_friction(context: Context) -> str:
-    """Explain the names of simulated logs by their friction, if this friction differs between logs."""
-    families = dict.fromkeys(log.get("family", "") for log in context.study.truth.get("log", []))
-    matched = [name for name in families if name in context.study.truth.get("theta", {})]
-    others = [name for name in families if name and name not in matched]
-    first, second = (literal(", ".join(names)) for names in (matched, others))
-    text = f" Logs named {first}-… are simulated with the friction of the joint models, {second}-… with another."
-    return text if matched and others else ""
 
 
 def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:

@@ -1,11 +1,12 @@
 """Comparison of a simulated study with its ground truth, which only the report reads."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from davinci_forces.records import Prediction, TipContact, TipForce, Track
+from davinci_forces.records import Fit, Prediction, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
@@ -28,6 +29,19 @@ PUSH_SHAPES = {
     "triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)),
     "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)),
 }
+# What the simulator puts into a joint: the effect, its parameters in truth.toml, and the terms that represent it.
+EFFECTS = (
+    ("viscous friction", "v = {viscous:g}", "viscous friction"),
+    ("Coulomb friction, up and down", "c = {coulomb_up:g}, {coulomb_down:g}", "Coulomb friction|offset"),
+    ("Stribeck peak", "s = {static_up:g}, {static_down:g}; w = {stribeck_velocity:g}", "Stribeck friction"),
+    ("presliding (LuGre)", "σ₀ = {bristle_stiffness:g}; σ₁ = {bristle_damping:g}", "presliding friction"),
+)
+WITHOUT_TERM = (
+    ("rotor inertia [kg m²]", "rotor_inertia", "part of the inertia"),
+    ("winding’s inductance [H]", "inductance", "none: the current is measured, not the voltage"),
+    ("current limit [A]", "current_limit", "none: the measured current is limited, too"),
+    ("voltage limit [V]", "voltage_limit", "none: the current is measured, not the voltage"),
+)
 COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
@@ -44,6 +58,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "analysis reads it. This section compares external efforts with it, and parameters, if the logs were "
         "simulated with the friction of the model."
     )
+    yield from effects(context)
     yield from of_friction(context)
     errors: list[float] = []
     for joint, path, theta in true_parameters(context):
@@ -61,6 +76,50 @@ def blocks(context: Context) -> Iterator[Block]:
     shown = 0 if tip else 1  # figures on paper, if no force at the tip is compared there
     name = f"{count(len(figures) - shown, 'comparison')} of tracked and true effort"
     yield from first_on_paper(figures, name, "more-truth", shown)
+
+
+def effects(context: Context) -> Iterator[Table]:
+    """What was put into each joint of an arm, the term that represents it, and its value in the model that was used."""
+    truth = context.study.truth
+    fitted = {log for fit in context.own_fits() for log in fit.logs}
+    family = next((log.get("family", "") for log in truth.get("log", []) if log["name"] in fitted), "")
+    rows: list[tuple[Cell, ...]] = []
+    for joint, friction in truth.get("friction", {}).get(family, {}).items():
+        parameters = dict(used_parameters(context, joint))
+        for effect, symbols, terms in EFFECTS:
+            rows += [
+                (title(joint), effect, symbols.format(**friction), *cells)
+                for cells in of_terms(context, terms, parameters)
+            ]
+    motors = truth.get("motors", {})
+    for effect, key, why in WITHOUT_TERM if rows else ():
+        rows.append(("Motors", effect, ", ".join(f"{x:g}" for x in motors[key]), why, "–"))
+    if rows:
+        yield Table(
+            "What was put into the arm, in SI units; the terms that represent it; and their values in the model that "
+            "the filter used. Coulomb friction is the mean of its levels up and down, and half their difference is an "
+            "offset or a part of gravity. Presliding friction takes over Coulomb friction.",
+            ("Joint", "Effect", "Put in", "Term", "Estimated"),
+            tuple(rows),
+            "put-in",
+            "llllr",
+        )
+
+
+def used_parameters(context: Context, joint: str) -> Iterator[tuple[str, str]]:
+    """The parameters of a joint in the fit that the filter used, by name, with their keys."""
+    name = context.used_fit(joint)
+    name = name.partition(".")[2] if name.count(".") > 1 else name
+    for fit in context.catalogue.records(Fit):
+        for parameter in map(str, fit.parameter) if f"{fit.model}.{fit.estimator}" == name else ():
+            if fit.group == joint or parameter.endswith(f" of {joint}"):
+                yield parameter.removesuffix(f" of {joint}"), f"fit.{fit.group}.{name}.{slug(parameter)}"
+
+
+def of_terms(context: Context, terms: str, parameters: dict[str, str]) -> list[tuple[Cell, Cell]]:
+    """The parameters of the terms (alternatives, separated by |) with their estimates; or that none was taken."""
+    taken = [(name, key) for name, key in parameters.items() if re.match(terms, name)]
+    return [(name, context.number(key, 3)) for name, key in taken] or [(terms.replace("|", " and "), "not taken")]
 
 
 def of_friction(context: Context) -> Iterator[Block]:

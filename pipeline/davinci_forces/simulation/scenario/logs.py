@@ -19,7 +19,7 @@ FORMATS = (".tdms", ".lvm")
 
 
 def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
-    """Read every [[log]]; a log of several families appears once for each family, with the family in its name."""
+    """Read every [[log]]; a log of several families appears once for each, with the family in its name."""
     entries = table.tables("log", "it has no [[log]], so nothing would be recorded")
     logs = [(i, log) for i, entry in enumerate(entries) for log in _log(entry, joints, families)]
     for field in ("name", "file"):
@@ -92,6 +92,8 @@ def _of_arm(
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
     roles_table.close()
     shared = replace(log, lead=lead, skip=skip, mass=mass, tip=tip, tissue=tissue, sensor=sensor)
+    if len(families) == 1:
+        return [replace(shared, family=families[0], role=roles[families[0]])]
     return [
         replace(shared, name=f"{name}-{log.name}", file=f"{name}_{log.file}", family=name, role=roles[name])
         for name in recorded_families

@@ -65,6 +65,7 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
     if math.isfinite(period) and abs(period - round(period)) > 1e-6:
         message = f"the controller's period at {rate:g} Hz must be a whole number of ticks, not {period:g}"
         table.problem(message, "arm", "tick")
+    jitter, harmonics = table.number("clock_jitter", 0.0, low=0.0), table.whole("harmonics", 0)
     logs = logs_of(table, joints, tuple(arm.families) if arm else ())
     for log in logs:
         samples = (log.lead + log.duration) * rate
@@ -74,7 +75,7 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
     if started and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", started):
         table.problem(f"started must be a date and time such as '2016-05-02T09:00:00', not {started!r}", "started")
     table.close()
-    return Scenario(name, title, robot, seed, rate, started, joints, logs, arm)
+    return Scenario(name, title, robot, seed, rate, started, joints, logs, arm, jitter, harmonics)
 
 
 def _robot(table: TomlTable) -> Robot:

@@ -145,3 +145,5 @@ class Scenario:
     joints: dict[str, SimulatedJoint]
     logs: tuple[SimulatedLog, ...]
     arm: SimulatedArm | None = None
+    clock_jitter: float = 0.0  # [s] standard deviation of the instants of the samples
+    harmonics: int = 0  # of the excitation, for the settings of the study; 0 takes the robot's

@@ -20,6 +20,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     """Measure the contacts of one joint: in windows that the study states, and others above the alarm level.
 
     At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
+    A window on a joint at rest counts only if a contact was detected in it.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
     """
     if entry.role not in ("contact", "validation", "identification"):
@@ -36,7 +37,8 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
         for event in events(track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, alarm_level, track.smooth_rise)
         if converged[np.searchsorted(track.t, event.onset).clip(0, len(converged) - 1)]
     ]
-    placed = list(match_windows(sorted(entry.contact), detected))
+    pairs = match_windows(sorted(entry.contact), detected)
+    placed = [(window, event, stated) for window, event, stated in pairs if event or not track.at_rest]
     if placed:
         yield from contacts(track, threshold, placed)
 
