@@ -133,10 +133,8 @@ def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
                 lines += _table(f"noise.{name}.{joint}", vars(noise))
                 friction = {key: float(values[i]) for key, values in family.friction._asdict().items()}
                 lines += _table(f"friction.{name}.{joint}", friction)
-        motors = scenario.arm.motors
-        drives = {"rotor_inertia": scenario.arm.rotors, "inductance": motors.inductance}
-        limits = {"current_limit": motors.current_limit, "voltage_limit": motors.voltage_limit}
-        lines += _table("motors", {key: values.tolist() for key, values in (drives | limits).items()})
+        motors = {"rotor_inertia": scenario.arm.rotors} | scenario.arm.motors._asdict()
+        lines += _table("motors", {key: values.tolist() for key, values in motors.items()})
     return "\n".join([*lines, "", *entries])
 
 

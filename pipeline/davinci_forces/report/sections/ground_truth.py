@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.records import Fit, Prediction, TipContact, TipForce, Track
+from davinci_forces.records import Fit, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.content.number import MINUS
-from davinci_forces.report.context import BASELINE_FIT, Context, count, fit_name, label, title
+from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import first_on_paper, run_name
 from davinci_forces.report.verdicts import truth_level
 
@@ -36,12 +36,7 @@ EFFECTS = (
     ("Stribeck peak", "s = {static_up:g}, {static_down:g}; w = {stribeck_velocity:g}", "Stribeck friction"),
     ("presliding (LuGre)", "σ₀ = {bristle_stiffness:g}; σ₁ = {bristle_damping:g}", "presliding friction"),
 )
-WITHOUT_TERM = (
-    ("rotor inertia [kg m²]", "rotor_inertia", "part of the inertia"),
-    ("winding’s inductance [H]", "inductance", "none: the current is measured, not the voltage"),
-    ("current limit [A]", "current_limit", "none: the measured current is limited, too"),
-    ("voltage limit [V]", "voltage_limit", "none: the current is measured, not the voltage"),
-)
+WITHOUT_TERM = "none: the current is measured"
 COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
@@ -55,11 +50,10 @@ def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
-        "analysis reads it. This section compares external efforts with it, and parameters, if the logs were "
-        "simulated with the friction of the model."
+        "analysis reads it. This section compares external efforts with it, and the parameters of models that have "
+        "all of the friction that was put in."
     )
     yield from effects(context)
-    yield from of_friction(context)
     errors: list[float] = []
     for joint, path, theta in true_parameters(context):
         yield from parameters(context, joint, path, theta, errors)
@@ -79,22 +73,20 @@ def blocks(context: Context) -> Iterator[Block]:
 
 
 def effects(context: Context) -> Iterator[Table]:
-    """What was put into each joint of an arm, the term that represents it, and its value in the model that was used."""
-    truth = context.study.truth
+    """What was put into an arm, the terms that represent it, and their values in the model that the filter used."""
     fitted = {log for fit in context.own_fits() for log in fit.logs}
-    family = next((log.get("family", "") for log in truth.get("log", []) if log["name"] in fitted), "")
+    family = {log.get("family") for log in context.study.truth.get("log", []) if log["name"] in fitted}
     rows: list[tuple[Cell, ...]] = []
-    for joint, friction in truth.get("friction", {}).get(family, {}).items():
-        parameters = dict(used_parameters(context, joint))
-        for effect, symbols, terms in EFFECTS:
-            rows += [
-                (title(joint), effect, symbols.format(**friction), *cells)
-                for cells in of_terms(context, terms, parameters)
-            ]
-    motors = truth.get("motors", {})
-    for effect, key, why in WITHOUT_TERM if rows else ():
-        rows.append(("Motors", effect, ", ".join(f"{x:g}" for x in motors[key]), why, "–"))
+    for name, friction in context.study.truth.get("friction", {}).items():
+        for joint, parameters in friction.items() if name in family else ():
+            keys = dict(used_parameters(context, joint))
+            for effect, symbols, terms in EFFECTS:
+                of_effect = [(term, context.number(key, 3)) for term, key in keys.items() if re.match(terms, term)]
+                cells = of_effect or [(terms.replace("|", ", "), "not taken")]
+                rows += [(title(joint), effect, symbols.format(**parameters), *cell) for cell in cells]
     if rows:
+        rows.append(("Motors", "rotor inertia", "see truth.toml", "part of the inertia", "–"))
+        rows.append(("Motors", "windings, limits of current and voltage", "see truth.toml", WITHOUT_TERM, "–"))
         yield Table(
             "What was put into the arm, in SI units; the terms that represent it; and their values in the model that "
             "the filter used. Coulomb friction is the mean of its levels up and down, and half their difference is an "
@@ -107,53 +99,13 @@ def effects(context: Context) -> Iterator[Table]:
 
 
 def used_parameters(context: Context, joint: str) -> Iterator[tuple[str, str]]:
-    """The parameters of a joint in the fit that the filter used, by name, with their keys."""
+    """The parameters of a joint in the fit that the filter used, by name, with the keys of their values."""
     name = context.used_fit(joint)
     name = name.partition(".")[2] if name.count(".") > 1 else name
     for fit in context.catalogue.records(Fit):
         for parameter in map(str, fit.parameter) if f"{fit.model}.{fit.estimator}" == name else ():
             if fit.group == joint or parameter.endswith(f" of {joint}"):
                 yield parameter.removesuffix(f" of {joint}"), f"fit.{fit.group}.{name}.{slug(parameter)}"
-
-
-def of_terms(context: Context, terms: str, parameters: dict[str, str]) -> list[tuple[Cell, Cell]]:
-    """The parameters of the terms (alternatives, separated by |) with their estimates; or that none was taken."""
-    taken = [(name, key) for name, key in parameters.items() if re.match(terms, name)]
-    return [(name, context.number(key, 3)) for name, key in taken] or [(terms.replace("|", " and "), "not taken")]
-
-
-def of_friction(context: Context) -> Iterator[Block]:
-    """The effect of friction on a fit, if parameters are fitted to recordings with other friction than the models."""
-    family = {log["name"]: log.get("family", "") for log in context.study.truth.get("log", [])}
-    matched = [name for name in context.study.truth.get("theta", {}) if name in family.values()]
-    fitted = sorted({family.get(log, "") for fit in context.own_fits() for log in fit.logs})
-    if not matched or not fitted or set(fitted) & set(matched):
-        return
-    yield Prose(
-        f"**What friction does to a fit.** Parameters are identified from the recordings {literal(', '.join(fitted))}, "
-        "whose friction differs by direction, rises near rest and yields elastically before it slides. The true "
-        f"parameters below are those of the recordings {literal(', '.join(matched))}, which differ only in having the "
-        "friction of the models. So the error of an estimate is the effect of the other friction. It is far larger "
-        "than the noise, and the model's part of the standard errors has to hold it."
-    )
-    yield errors_by_family(context, family)
-
-
-def errors_by_family(context: Context, family: dict[str, str]) -> Table:
-    """The model error of each joint in logs that were not fitted, by the friction of the logs."""
-    unseen = [p for p in context.catalogue.records(Prediction) if p.role != "identification"]
-    used = [p for p in unseen if f"{p.model}.{p.estimator}" in (context.used_fit(p.joint), BASELINE_FIT)]
-    rows = tuple(
-        (
-            title(p.joint),
-            literal(family.get(p.log, "") or "–"),
-            fit_name(p.model, p.estimator),
-            *context.numbers(p.prefix, ("model_error", "effort_rms"), 2),
-        )
-        for p in sorted(used, key=lambda p: (p.joint, p.model, family.get(p.log, "")))
-    )
-    header = ("Joint", "Friction", "Fit", "Model error", "Effort")
-    return Table("Model error by the friction of logs not fitted.", header, rows, "error-by-friction", "lllrr")
 
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
