@@ -29,7 +29,7 @@ class SimulatedMotion:
     tau: Array  # effort of the motor
     tau_ext: Array  # effort of the joint on its surroundings
 
-    def at(self, t: Array, instants: Array) -> "SimulatedMotion":
+    def interpolate(self, t: Array, instants: Array) -> "SimulatedMotion":
         """Interpolate the motion at the times t (N,) [s] to other instants (N,) [s]."""
         return SimulatedMotion(*(np.interp(instants, t, x) for x in (self.q, self.dq, self.tau, self.tau_ext)))
 

@@ -68,7 +68,7 @@ def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) ->
     channels = [SimulatedChannel("time", "Time", "s", run.t)] if log.clock == "channel" else []
     late = generator(scenario.seed, log.name, "clock").normal(0.0, scenario.clock_jitter, len(run.t))
     for name, true in run.motions.items():
-        motion = true.at(run.t, run.t + late) if scenario.clock_jitter else true
+        motion = true.interpolate(run.t, run.t + late) if scenario.clock_jitter else true
         random = generator(scenario.seed, log.name, name)
         noise = scenario.arm.families[log.family].noise[name] if scenario.arm else scenario.joints[name].noise
         channels += record(scenario.joints[name], motion, noise, scenario.rate, log.current_unit, random)
