@@ -29,7 +29,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
-from davinci_forces.report.sections import DOCUMENTS, SECTIONS, joints, runs, tissue
+from davinci_forces.report.sections import DOCUMENTS, SECTIONS, ground_truth, joints, runs, tissue
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
@@ -139,6 +139,24 @@ def test_a_precise_stiffness_that_misses_the_truth_is_not_called_good(full: Cont
     precise = replace(measured, stiffness=1000.0, stiffness_std=1.0, pushes=5)
     study = replace(full.study, truth={"log": [{"name": measured.log, "stiffness": true}]})
     assert tissue.verdict(replace(full, study=study), precise).level == level
+
+
+def test_each_effect_that_a_simulation_put_in_has_its_term_with_its_value_or_none(full: Context):
+    parameters = ("viscous", "coulomb_up", "coulomb_down", "static_up", "static_down", "stribeck_velocity",
+                  "bristle_stiffness", "bristle_damping")  # fmt: skip
+    friction = {"lab": {"hand_roll": dict.fromkeys(parameters, 0.25)}, "another": {"hand_roll": {}}}
+    logs = [{"name": log, "family": "lab"} for fit in full.own_fits() for log in fit.logs]
+    study = replace(full.study, truth={"friction": friction, "log": logs})
+    [table] = [block for block in ground_truth.blocks(replace(full, study=study)) if isinstance(block, Table)]
+    rows = {(row[1], row[3]): row[4] for row in table.rows}
+    estimate = rows["viscous friction", "viscous friction"]
+    names = dict(ground_truth.used_parameters(full, "hand_roll"))
+    assert estimate == full.results[names["viscous friction"]].number(3)
+    assert {effect for effect, _ in rows} >= {effect for effect, _, _ in ground_truth.EFFECTS}
+    for effect, _, terms in ground_truth.EFFECTS:
+        taken = any(re.match(terms, name) for name in names)
+        assert taken != (rows.get((effect, terms.replace("|", ", "))) == "not taken")
+    assert rows["windings, limits of current and voltage", ground_truth.WITHOUT_TERM] == "–"
 
 
 def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, catalogue: Catalogue):

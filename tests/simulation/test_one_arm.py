@@ -1,4 +1,4 @@
-"""The demonstration study: one arm, whose logs in git are those of its scenario, and whose samples come late or early."""
+"""The demonstration study: one arm, whose logs in git are its scenario's, and whose samples come late or early."""
 
 import tomllib
 from dataclasses import replace
