@@ -168,6 +168,16 @@ def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows
     assert (len(contact), contact.found[0], contact.above[0]) == (1, 1, 1)
 
 
+def test_the_deviation_of_a_mean_holds_what_the_smoother_spreads_out_of_the_window():
+    t, rise = np.arange(2000) / 100.0, 0.2  # [s]
+    weights = np.exp(-np.abs(np.arange(-200, 201)) / 100.0 * 4.0 * np.log(2.0) / rise)
+    pulse = np.where((t >= 10.0) & (t <= 12.5), 2.0, 0.0)
+    smooth = np.convolve(pulse, weights / weights.sum(), "same")
+    summary = summarise(t, (smooth, np.zeros(2000)), (10.0, 12.5), t < 5.0, rise)
+    assert summary.mean < 1.97
+    assert summary.mean_std == pytest.approx(2.0 - summary.mean, rel=0.15)
+
+
 def test_noise_is_told_from_the_error_of_a_model():
     """Of white noise and a slow error, each is found, in the presence of a few jumps."""
     segment, error = np.zeros(len(T), int), 0.05 * np.sin(2 * np.pi * 0.4 * T)

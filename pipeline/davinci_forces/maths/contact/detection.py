@@ -13,7 +13,8 @@ A window of contact is summarised by peak, mean and impulse of the external effo
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
 The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off is added.
-It is taken as the peak minus the mean over `TIP_REACH` on either side.
+It is taken as the peak minus the mean over `TIP_REACH` on either side.  What the smoother spreads out of the window, up
+to that far, is added to the standard error of the mean.
 """
 
 from collections.abc import Iterator, Sequence
@@ -144,7 +145,9 @@ def summarise(
         return None
     duration, mean = end - start, float(inside.mean())
     constant = 0.0 if constant_std is None else float(constant_std[within].mean())
-    mean_std = float(np.hypot(mean_size(tau_ext, free, len(inside)), constant))
+    beside = ~within & (t >= start - TIP_REACH * rise) & (t <= end + TIP_REACH * rise)
+    spread_out = float(tau_ext[beside].sum() / len(inside))
+    mean_std = float(np.linalg.norm([mean_size(tau_ext, free, len(inside)), constant, spread_out]))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
     peak_std = float(np.linalg.norm([std[k], rounded_off, largest_size(tau_ext, free, len(inside))]))
