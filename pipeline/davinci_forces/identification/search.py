@@ -241,7 +241,8 @@ def search_joints(
     """Search for the model of each joint, by itself and, if `arm` has logs of all joints, coupled to the others."""
     searches = []
     for joint, logs in separate.items():
-        for structure, used in (("independent", logs), ("coupled", arm)):
+        moved = [log for log in arm if log.is_moving[log.joints.index(joint)]]
+        for structure, used in (("independent", logs), ("coupled", moved)):
             if used:
                 search = JointSearch(robot, joint, structure, searched_logs(used), reaches[joint])
                 searches += [result] if (result := search.run(Processing(lowpass, 0.0))) else []
