@@ -2,12 +2,23 @@
 
 import re
 from dataclasses import replace
+from hashlib import sha256
 from importlib import import_module
 
 import numpy as np
 import pytest
 
-from davinci_forces.records import KINDS, Diagnostic, Fit, LogSummary, Stiffness, Track
+from davinci_forces.records import (
+    KINDS,
+    Diagnostic,
+    Fit,
+    FreeSpace,
+    LogSummary,
+    Prediction,
+    Stiffness,
+    Track,
+    Weight,
+)
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.record import diagnostic
 from davinci_forces.report.changes import StatedValue
@@ -30,6 +41,8 @@ from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import DOCUMENTS, SECTIONS, ground_truth, joints, runs, tissue
+from davinci_forces.report.sections.summary import opening
+from davinci_forces.report.verdicts import Trust
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
@@ -181,10 +194,68 @@ def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_
         values["theta"][0] = -0.0045
         return [replace(fit, estimator=name, **values) for name in ("lse", "wlse", "tls", "huber", "prior", "iv")]
 
-    [verdict] = joints.implausible(fits(0.02))
+    joint = full.own_fits()[0].group
+    [verdict] = joints.implausible(fits(0.02), joint)
     assert (verdict.level, "cannot be distinguished from zero" in verdict.text) == ("info", True)
-    [verdict] = joints.implausible(fits(0.001))
+    [verdict] = joints.implausible(fits(0.001), joint)
     assert (verdict.level, "physically impossible" in verdict.text) == ("warn", True)
+
+
+def test_coulomb_friction_may_be_negative_beside_presliding_friction_that_outweighs_it(full: Context):
+    fit = full.own_fits()[0]
+    row = [str(name) for name in fit.parameter].index("Coulomb friction")
+    other = next(i for i in range(len(fit)) if i != row)
+    names = fit.parameter.copy()
+    names[other] = "presliding friction 1"
+    theta = np.full(len(fit), 0.5)
+    theta[row] = -0.2
+    values = {"parameter": names, "theta_std": np.full(len(fit), 0.01), "positive": np.ones(len(fit))}
+    assert not [*joints.implausible([replace(fit, theta=theta, **values)], fit.group)]
+    theta[other] = 0.1
+    [verdict] = joints.implausible([replace(fit, theta=theta, **values)], fit.group)
+    assert verdict.text.startswith("**Coulomb friction** is negative")
+
+
+def trusts(full: Context, **shares: float) -> list[Trust]:
+    """The trust in joints whose models err by these shares of the effort, on a path that no fit had seen."""
+    p, space = full.catalogue.records(Prediction)[0], full.catalogue.records(FreeSpace)[0]
+    return [
+        Trust(
+            joint, replace(p, role="validation", path="another path", model_error=share, effort_rms=1.0),
+            replace(space, coverage=0.95, detection_level=0.07), None,
+        )
+        for joint, share in shares.items()
+    ]  # fmt: skip
+
+
+def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Context):
+    said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
+    assert said == (
+        "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
+        "hand pitch; on an unseen path the model errs by 30 % on the instrument slide, too much to be believed; the "
+        "95 % bands are right or too wide."
+    )
+    [narrow] = trusts(full, hand_roll=0.05)
+    narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
+    assert opening.verdict_sentence(full, [narrow]).endswith("the 95 % band is too narrow on the hand roll.")
+    assert "can be believed" not in opening.verdict_sentence(full, [narrow])
+
+
+def test_page_one_says_what_was_measured_beside_what_is_stated(full: Context):
+    lines = opening.measurements(full)
+    [weight, *_] = full.catalogue.records(Weight)
+    assert any(f"**{weight.log}**: mass" in line and f"stated {weight.stated_mass:g} kg" in line for line in lines)
+    assert len(lines) <= opening.MAX_MEASURED + 1
+
+
+@pytest.mark.parametrize(("same", "words"), [(True, "● Accept**."), (False, "The numbers have changed since")])
+def test_the_sign_off_shows_the_verdict_of_review_toml(full: Context, same: bool, words: str):
+    now = sha256(full.results.json()).hexdigest() if same else "0" * 64
+    signed = Rating("study", "", "accept", "fit <for> use", "R", "2026-01-02", now)
+    text = opening.sign_off(replace(full, ratings=(signed,))).text
+    assert text.startswith("Reviewed by R on 2026-01-02")
+    assert words in text
+    assert "____" in opening.sign_off(replace(full, ratings=())).text
 
 
 def test_sentences_of_a_report_are_short(full: Context):

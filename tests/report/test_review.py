@@ -46,6 +46,15 @@ def test_a_rating_says_what_of_whom_and_of_which_numbers(tmp_path):
     assert read(tmp_path, "") == ()
 
 
+def test_a_verdict_on_the_study_stands_beside_the_ratings(tmp_path):
+    """Last, wherever it stands in the file; a file without it, as of earlier versions, is valid."""
+    verdict = f'[verdict]\nverdict = "reject"\nreviewer = "R"\nresults = "{HASH}"\n'
+    assert [rating.subject for rating in read(tmp_path, verdict + GOOD)] == ["figure", "study"]
+    assert read(tmp_path, verdict) == (Rating("study", "", "reject", "", "R", "", HASH),)
+    with pytest.raises(BadStudy, match=r"review.toml:2: verdict: verdict must be one of accept, doubt, reject"):
+        read(tmp_path, verdict.replace("reject", "maybe"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -157,9 +166,12 @@ def test_what_the_page_exports_is_what_was_said_and_the_study_s_reader_takes_it(
     fill(browser, "#zoom .tools button[aria-label^=Rate]", "doubt", HOSTILE)
     browser.run("document.querySelector('.reviewing select').value = 'roll'")
     fill(browser, ".reviewing .tools button", "accept", "fine \ud800 half")
+    fill(browser, ".reviewing .tools button:nth-of-type(2)", "reject", "first")
+    fill(browser, ".reviewing .tools button:nth-of-type(2)", "accept", "on the whole")
     text = browser.run("reviewToml()")
     assert len(tomllib.loads(text)["rating"]) == 4
-    old, kept, new, run = read(tmp_path, text)
+    old, kept, new, run, study = read(tmp_path, text)
+    assert (study.subject, study.verdict, study.comment) == ("study", "accept", "on the whole")
     assert (old.comment, old.results) == (HOSTILE, OLD)
     assert (kept.subject, kept.name, kept.results) == ("run", "push", HASH)
     assert (new.subject, new.name, new.verdict, new.comment, new.reviewer, new.results) == (

@@ -78,6 +78,11 @@ class Context:
             return [fit.group]
         return [name for name in names if any(str(p).endswith(f" of {name}") for p in fit.parameter)] or names
 
+    def true_stiffness(self, log: str) -> float | None:
+        """The stiffness [N/m] of the tissue of a simulated log, None of a recorded one."""
+        entries = [entry for entry in self.study.truth.get("log", []) if entry.get("name") == log]
+        return float(entries[0]["stiffness"]) if entries and "stiffness" in entries[0] else None
+
     def predicting_fits(self, joint: str) -> tuple[str, str]:
         """The names, in predictions, of the fit that the filter used, and of its refits without whole logs."""
         fit = self.used_fit(joint)

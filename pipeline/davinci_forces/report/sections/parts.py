@@ -8,6 +8,7 @@ from davinci_forces.report.content import AnyMark, Block, HBand, Line, OnScreen,
 from davinci_forces.report.context import Context, label, title
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
+RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 LEFT_OUT = {

@@ -5,10 +5,8 @@ from hashlib import sha256
 
 from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import paper_or_screen
+from davinci_forces.report.sections.parts import RATINGS, paper_or_screen
 from davinci_forces.study.review import STUDY, Rating
-
-MARKS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 
 
 def section(context: Context) -> Section | None:
@@ -48,7 +46,7 @@ def row(context: Context, rating: Rating, same: bool) -> tuple[Cell, ...]:
     """One rating."""
     return (
         subject(context, rating),
-        MARKS[rating.verdict],
+        RATINGS[rating.verdict],
         literal(rating.comment) or "–",
         literal(rating.reviewer) or "–",
         literal(rating.date) or "–",

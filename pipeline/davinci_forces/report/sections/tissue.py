@@ -82,17 +82,11 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     law = chosen_law(context, tissue.log)
     text = f"{name}: {stiffness} from {tissue.pushes} of {pushes(len(tissue))}{f'; best model: {law}' if law else ''}"
     text += "; most pushes do not count" if is_minority(tissue) else ""
-    true = true_stiffness(context, tissue.log)
+    true = context.true_stiffness(tissue.log)
     if true is not None:
         missed = abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
         text += f"; the 95 % interval {'misses' if missed else 'contains'} the true {true:g} N/m"
     return Verdict(stiffness_level(tissue, true), f"{text}.")
-
-
-def true_stiffness(context: Context, log: str) -> float | None:
-    """The stiffness [N/m] of the tissue of a simulated log, None of a recorded one."""
-    entries = [entry for entry in context.study.truth.get("log", []) if entry.get("name") == log]
-    return float(entries[0]["stiffness"]) if entries and "stiffness" in entries[0] else None
 
 
 def chosen_law(context: Context, log: str) -> str:

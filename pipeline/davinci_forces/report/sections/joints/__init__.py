@@ -74,7 +74,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
         else:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
     yield from unidentified_parameters(context, joint)
-    yield from implausible([used] if used is not plain else fits)
+    yield from implausible([used] if used is not plain else fits, joint)
     yield from left_out(context, joint)
     yield comparison(context, fits, plain)
 
@@ -123,13 +123,20 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     return f"{text} {where}, the relative error is {after}; that of the joint by itself is {before}."
 
 
-def implausible(fits: list[Fit]) -> Iterator[Verdict]:
-    """Each parameter that fits make negative although it is positive in every mechanism, once for all fits."""
+def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
+    """Each parameter that fits make negative although it is positive in every mechanism, once for all fits.
+
+    Coulomb friction and presliding friction add up: one may be negative where their sum is not.
+    """
     values: dict[str, list[tuple[float, float, str]]] = {}
     for fit in fits:
-        for name, value, std, positive in zip(fit.parameter, fit.theta, fit.theta_std, fit.positive, strict=True):
-            if value < 0 and positive:
-                values.setdefault(str(name), []).append((value, std, title_of(fit.estimator)))
+        rows = of_joint(fit, joint)
+        sliding = [i for i in rows if str(fit.parameter[i]).startswith(("Coulomb friction", "presliding", "smooth"))]
+        for i in rows:
+            adds_up = i in sliding and fit.theta[sliding].sum() > 0
+            if fit.theta[i] < 0 and fit.positive[i] and not adds_up:
+                name = str(fit.parameter[i]).removesuffix(f" of {joint}")
+                values.setdefault(name, []).append((fit.theta[i], fit.theta_std[i], title_of(fit.estimator)))
     for name, negative in values.items():
         clear = [each for each in negative if is_impossible(*each[:2])]
         value, std, _ = min(clear or negative, key=lambda each: each[0] + NORMAL_95 * each[1])

@@ -27,26 +27,31 @@ def residual_blocks(context: Context, residual: Residual, label_end: str = "") -
     name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}{label_end}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
+    yield Figure(
+        f"{name}: averaged effort and model ({who}), and the residual of the model.",
+        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
+        (
+            effort_panel(residual, heading="Averaged effort and model"),
+            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+        ),
+        f"fit-figure-{place}",
+        columns=2,
+        height=34,
+    )
     moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
     q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
     yield Figure(
-        f"{name}: averaged effort and model ({who}), and the residual over time and against position and velocity "
-        "(points: means in 40 equal bins of the range, bars: their standard errors; line: mean of each direction), its "
-        "autocorrelation, and its cross-correlation with the motion (grey: 95 % band of white noise).",
-        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square). "
-        f"{in_words(residual, errors, q)}",
-        (
-            effort_panel(residual, heading="Averaged effort and model"),
-            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
-            *against,
-            *own_correlations(context, residual, errors, q),
-        ),
-        f"fit-figure-{place}",
+        f"{name}: the residual against position and velocity (points: means in 40 bins with standard errors; line: "
+        "mean of each direction), its autocorrelation, and its cross-correlation with the motion (grey: 95 % band of "
+        "white noise).",
+        f"{name}: {in_words(residual, errors, q)}",
+        (*against, *own_correlations(context, residual, errors, q)),
+        f"residual-figure-{place}",
         columns=2,
-        height=36,
+        height=34,
     )
     yield Prose(in_words(residual, errors, q))
 

@@ -24,8 +24,8 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.summary.opening import (
-    listed,
-    measured,
+    as_list,
+    measurements,
     nothing_identified,
     sign_off,
     verdict_sentence,
@@ -44,7 +44,7 @@ from davinci_forces.report.verdicts import (
 from davinci_forces.robots.robot import Kind
 
 MAX_IN_COLUMN = 3  # panels below each other on page one
-FIGURE_HEIGHT, LINE_HEIGHT = 65.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
+ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 65.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
 def section(context: Context) -> Section:
@@ -58,7 +58,7 @@ def blocks(context: Context) -> Iterator[Block]:
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{verdict_sentence(context, trusts)}**")
-    if lines := measured(context):
+    if lines := measurements(context):
         yield Bullets(lines)
     if not trusts:
         yield from nothing_identified(context)
@@ -138,7 +138,7 @@ def efforts_in_words(context: Context) -> str:
         (Kind.PRISMATIC, ""): "force [N] at joints that slide",
     }
     currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
-    return listed([*(text for kind, text in words.items() if kind in kinds), *currents])
+    return as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
@@ -193,7 +193,7 @@ def spoken(contact: Contact) -> str:
 
 def panel_height(panels: int, lines: int) -> float:
     """The height [mm] of each of the panels that leaves room on page one for the table and for lines of results."""
-    room = FIGURE_HEIGHT - LINE_HEIGHT * (lines + max(panels - MAX_IN_COLUMN, 0))
+    room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (lines + max(panels - MAX_IN_COLUMN, 0))
     return room / min(panels, MAX_IN_COLUMN)
 
 

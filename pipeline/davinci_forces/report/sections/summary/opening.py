@@ -8,9 +8,8 @@ import numpy as np
 from davinci_forces.records import Stiffness, Weight
 from davinci_forces.report.content import Prose, Verdict, literal
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections import tissue
-from davinci_forces.report.sections.review import MARKS
-from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent
+from davinci_forces.report.sections.parts import RATINGS
+from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
 MAX_MEASURED = 3  # masses and stiffnesses on page one
@@ -26,10 +25,10 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         for t in fine
         if t.space is not None
     ]
-    parts = [f"efforts {listed(levels)} can be believed"] if levels else []
+    parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine])
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
-    which = f"the {listed(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
+    which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["the 95 % bands are right or too wide"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
@@ -46,7 +45,7 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
             level, error = "bad", f"{error}, whose detection level is above the effort sought"
         kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
     for (path, why), joints in kinds.items():
-        yield f"on {path} the model errs by {listed(joints)}{f', {why}' if why else ''}"
+        yield f"on {path} the model errs by {as_list(joints)}{f', {why}' if why else ''}"
 
 
 def name_in_sentence(joint: str) -> str:
@@ -54,12 +53,12 @@ def name_in_sentence(joint: str) -> str:
     return literal(joint.replace("_", " "))
 
 
-def listed(parts: Sequence[str]) -> str:
+def as_list(parts: Sequence[str]) -> str:
     """Parts of a sentence as a list: 'a, b and c'."""
     return " and ".join(", ".join(parts).rsplit(", ", 1))
 
 
-def measured(context: Context) -> tuple[str, ...]:
+def measurements(context: Context) -> tuple[str, ...]:
     """The masses beside the stated ones and the stiffnesses with their quartiles, with verdicts, a line each."""
     lines = [*masses(context), *stiffnesses(context)]
     more = [f"{count(len(lines) - MAX_MEASURED, 'more log')}: see the contents."] if lines[MAX_MEASURED:] else []
@@ -77,11 +76,11 @@ def masses(context: Context) -> Iterator[str]:
 def stiffnesses(context: Context) -> Iterator[str]:
     """The stiffness of each tissue log with its standard error, and the quartiles of its pushes."""
     for log in context.catalogue.records(Stiffness):
-        level = tissue.verdict(context, log).level
+        level = stiffness_level(log, context.true_stiffness(log.log))
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
         quartiles = f", quartiles {low} and {high}" if log.pushes > 1 else ""
-        pushes = f" ({log.pushes} of {tissue.pushes(len(log))})"
-        yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{pushes}".strip()
+        used = f" ({log.pushes} of {len(log)} pushes)"
+        yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
@@ -102,4 +101,4 @@ def sign_off(context: Context) -> Prose:
     words = f" {literal(signed.comment)}" if signed.comment else ""
     same = signed.results == sha256(context.results.json()).hexdigest()
     changed = "" if same else " **The numbers have changed since.**"
-    return Prose(f"Reviewed by {literal(signed.reviewer) or '–'}{date}: **{MARKS[signed.verdict]}**.{words}{changed}")
+    return Prose(f"Reviewed by {literal(signed.reviewer) or '–'}{date}: **{RATINGS[signed.verdict]}**.{words}{changed}")
