@@ -109,7 +109,7 @@ def main() -> None:
     if sys.getfilesystemencoding() == "ascii" and os.environ.get("PYTHONUTF8") != "1":
         # ASCII cannot represent a file name with an umlaut.  Python restarts, and child processes start, in UTF-8 mode.
         os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | {"PYTHONUTF8": "1"})
-    arithmetic.pin()  # one thread and the same kernels for numpy, in this process and its children
+    arithmetic.pin()  # numpy uses one thread, and the same kernels on every machine, here and in child processes
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the console's encoding may lack characters of names in logs
             stream.reconfigure(errors="replace")

@@ -32,13 +32,13 @@ def run(
     dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
     ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
     noise: Annotated[
-        str | None, typer.Option(help="Noise of the efforts (std): expect standard errors; one number, or one a joint.")
+        str | None, typer.Option(help="Noise of the efforts (std), one or one a joint: print the expected errors.")
     ] = None,
     floor: Annotated[
-        float | None, typer.Option(help="With `all`: no moving frame goes below this z [m], in base axes.")
+        float | None, typer.Option(help="With JOINT `all`: no moving frame goes below this z [m], in base axes.")
     ] = None,
     box: Annotated[
-        list[str] | None, typer.Option(help="With `all`: no moving frame enters it: x,y,z,x,y,z [m]. May be repeated.")
+        list[str] | None, typer.Option(help="With JOINT `all`: no frame enters it: x,y,z,x,y,z [m]. May be repeated.")
     ] = None,
     starts: Annotated[
         int | None, typer.Option(min=1, help="Starts of the search; default 24, or 2 if JOINT is `all`.")

@@ -91,7 +91,7 @@ def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name:
 
 
 def lag(recordings: Sequence[FilterInput], smooth: Array, noise: NoiseModel) -> Array:
-    """Return the error (N,) that the filter's lag makes in recordings, by their smoothed external effort (N,).
+    """Return the error (N,) that the filter's lag makes in recordings, computed from their smoothed effort (N,).
 
     The error is the smoothed effort minus the filter's response to it.  That response is computed for a joint at rest,
     where the filter is linear: position and velocity stay 0.

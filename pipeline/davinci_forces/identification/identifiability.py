@@ -13,7 +13,7 @@ from davinci_forces.robots.robot import Joint, Robot
 MIN_CORRELATION = 0.95  # two parameters are reported as correlated from this correlation on
 MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than the best one is reported
 MIN_PART_NAMED = 0.1  # a combination is reported with the parameters whose squared component is at least this
-MIN_Z = 2.0  # a parameter within this many standard errors of noise from zero is not significant
+MIN_Z = 2.0  # ratio of a parameter to its standard error due to noise; a smaller one is not significant
 MIN_R2 = 0.5  # a model that explains less of the effort's variance hardly describes the effort
 
 
@@ -36,7 +36,7 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
 def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]:
     """Describe parameters that noise alone may cause, with an upper bound of their effort.
 
-    The error of the model is no reason: the data show a parameter that other terms would change.
+    The error due to the model does not count: the data determine such a parameter, though other terms would change it.
     """
     noise_std = estimate.standard_errors.noise
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
@@ -51,7 +51,7 @@ def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]
 
 def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
     """Recommend what to record next; "" without problems."""
-    return f"{better_motion(robot, joint)} designs a motion that excites them best" if problems else ""
+    return f"{better_motion(robot, joint)} designs a motion that excites these parameters best" if problems else ""
 
 
 def better_motion(robot: Robot, joint: Joint) -> str:
@@ -68,16 +68,16 @@ def inertia_at_fault(
     If the estimate is not significantly negative, the motion hardly excites the inertia.  If friction is negative, too,
     a sign is wrong.  Otherwise the model lacks a term.
     """
-    inertia_shares = np.array([term.a for term in joint.terms])  # term.a is the coefficient of the acceleration
-    value = float(inertia_shares @ estimate.theta)
-    std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, inertia_shares)
+    inertia_coefficients = np.array([term.a for term in joint.terms])  # term.a is the coefficient of the acceleration
+    value = float(inertia_coefficients @ estimate.theta)
+    std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, inertia_coefficients)
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
     omitted = f", and this model omits that {joints_move(others)} in the same logs" if others else ""
     if value > -MIN_Z * std:
         text = f"{inertia} may be positive, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
         return f"{text}; record the joint {by_itself}accelerating more: {better_motion(robot, joint)}"
-    friction = np.array([term.positive for term in joint.terms]) & (inertia_shares == 0)
+    friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
     negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and negative_friction.sum() * 2 >= friction.sum():
         text = f"{inertia}, and friction is negative, too: the effort opposes the motion"

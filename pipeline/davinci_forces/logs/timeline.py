@@ -34,7 +34,7 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Append samples; if `start` [s] is None or equals `due`, they continue the last part."""
+        """Append samples: to the last part if `start` [s] is None or `due`, the time after it; else as a new part."""
         due = self.due
         continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not continues or step != self.step[-1]:
@@ -118,7 +118,7 @@ class Sampling:
 class OwnClock:
     """The own clock of some channels of a log, in addition to the clock of the log."""
 
-    time: str  # name of the channel that is added with the times of this clock
+    time: str  # name of a channel that holds the times of this clock, and is added to the log
     channels: tuple[str, ...]  # in the order of the file
     x: str = ""  # name of the column with the times X of these channels; "" if the file has none
 

@@ -20,7 +20,7 @@ TARE_ROLES = ("validation", "identification")  # roles of logs in which nothing 
 MAX_LISTED = 100  # names of logs that one message lists
 MAX_POSITION = 3.0  # [m] distance from the remote centre; a larger position is probably in another unit
 WINDOWS = "a list of [start, end] in seconds, with 0 <= start < end"
-SEVERAL = ("files", "join")  # keys of several files: successive parts of a log; files with different channels of a log
+SEVERAL = ("files", "join")  # keys of a log in several files: `files` follow in time, `join` has other channels in each
 ALL = "all"  # value of `contact` in a tissue log whose samples are all in contact
 
 
@@ -49,7 +49,7 @@ def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
 
 
 def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]:
-    """The first line of the study file that names each log file."""
+    """For each log file, the first line of study.toml that names it."""
     lines: dict[str, int] = {}
     for n, log in enumerate(logs):
         key = next((key for key in SEVERAL if ("log", n, key) in study.file.lines), "file")

@@ -6,7 +6,7 @@
 D holds the lengths of the weighted columns, so U has columns of unit length.  The triangular factor U contains all
 information of the data for least squares, with or without bounds.  Its singular values show which parameters the data
 determine one by one, and which only in combination.  A column of B with a small singular value is a combination of
-parameters that hardly changes the effort.  If two estimates are correlated, so are their errors.
+parameters that hardly changes the effort.
 """
 
 from typing import NamedTuple

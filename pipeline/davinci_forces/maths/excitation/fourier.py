@@ -156,17 +156,18 @@ def condition_gradient(F: Array) -> tuple[float, Array]:
     """The natural logarithm of the condition number of F (K, p), and its gradient by the entries of F."""
     s, V = np.linalg.svd(triangle(F))[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = (np.outer(F @ v, v) / size**2 for v, size in ((V[0], s[0]), (V[-1], s[-1])))
-        return float(np.log(s[0] / s[-1])), np.asarray(np.subtract(*ends))
+        gradients = (np.outer(F @ v, v) / size**2 for v, size in ((V[0], s[0]), (V[-1], s[-1])))
+        return float(np.log(s[0] / s[-1])), np.asarray(np.subtract(*gradients))
 
 
 GRADIENTS = {"determinant": determinant_gradient, "condition": condition_gradient}
 
 
 def expected_std(F: Array, noise: Array) -> Array:
-    """Standard errors (p,) of least squares on F (K, p) with white `noise` (K,) as weights; infinite without full rank.
+    """Standard errors (p,) of least squares on F (K, p) with white noise of standard deviations `noise` (K,).
 
-    They are the roots of the diagonal of (F^T W F)^-1, with W = diag(1 / noise^2).  (6.31)
+    They are the roots of the diagonal of (F^T W F)^-1, with W = diag(1 / noise^2), and infinite without full rank.
+    (6.31)
     """
     R = triangle(F / noise[:, None])
     if not np.isfinite(condition(R)):
@@ -203,7 +204,7 @@ def shortest_run_in(
         t = np.linspace(-duration, 0.0, RUN_IN_INSTANTS)
         q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(run_in(s, t, duration) for s in series), strict=True))
         ranges_of_ddq = zip(bounds, ddq.min(axis=0), ddq.max(axis=0), strict=True)
-        slow = all(low <= least and largest <= high for (low, high), least, largest in ranges_of_ddq)
-        if slow and (hold is None or hold(q, dq, ddq)):
+        within_limits = all(low <= least and largest <= high for (low, high), least, largest in ranges_of_ddq)
+        if within_limits and (hold is None or hold(q, dq, ddq)):
             return float(duration)
     return None

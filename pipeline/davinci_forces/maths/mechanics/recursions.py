@@ -1,13 +1,13 @@
 """The dynamics of a tree of links: motions are computed from the base outwards, wrenches from the tips inwards.
 
 Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5 and 6), and the regressor; `link` has
-the equations of one link.  The effort of a coordinate that moves several links is the sum over these links.
+the equations of one link.  Where several links share a coordinate, its effort is the sum of theirs.
 
 The same source runs on numpy arrays and in compiled loops (`kernels`).  The last axis of every array has S samples.
-Loops run over `samples`: in numpy, one slice of all samples; in compiled code, `range(S)`.  `joints` (n + 1, 5, S) has
-cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no coordinate moves.  `scratch`
-(bodies, numbers, S) has the intermediate results of every body, the base first.  The caller sets it to 0 before its
-first use.
+`for s in samples` runs over numbers in compiled code (`range(S)`), and once in numpy, where s is a slice of all.
+`joints` (n + 1, 5, S) has cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no
+coordinate moves.  `scratch` (bodies, numbers, S) has the intermediate results of every body, the base first.  The
+caller sets it to 0 before its first use.
 """
 
 from collections.abc import Iterable

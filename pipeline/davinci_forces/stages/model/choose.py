@@ -1,4 +1,4 @@
-"""Search for the model of each joint by cross-validation, fit it to all logs, and average friction over velocity."""
+"""Search for the model of each joint by cross-validation, fit it to all logs, and map its friction over velocity."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence

@@ -20,7 +20,7 @@ MIN_MISMATCH = 5e-4  # relative difference above which a stated period may be re
 MIN_STANDARD_ERRORS = 4.0  # difference, in standard errors, above which the data exclude a stated period
 MAX_SEGMENTS = 5  # a repetition is searched for in this many of the longest segments
 MULTIPLES = (2, 3)  # multiples of the shortest period that are tried, since motion may almost repeat within a period
-MIN_REMARKED_LOSS = 0.1  # share of a period; a shorter transient next to a standstill is not reported
+MIN_REPORTED_TRANSIENT = 0.1  # share of a period; a shorter transient after a standstill is not reported
 MEASURED = ("q", "dq", "tau")
 
 
@@ -150,7 +150,7 @@ def omissions(
     faults *= bool(sides)
     for name, d in differing:
         inside = d.has_periods_on_both_sides
-        if inside or t[agreeing.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
+        if inside or t[agreeing.start] - t[span.start] > MIN_REPORTED_TRANSIENT * length or not sides:
             number = f"{'the remaining ' * (d.periods < differing[0][1].periods)}{d.periods}"
             differs = f"period {d.period + 1} of {number} differs from the others by {d.rms:.3g} rms in {name}"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
