@@ -43,7 +43,7 @@ def blocks(context: Context) -> Iterator[Block]:
         yield Prose(
             "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
             "smoother's part comes from noise and random walk. The model's part is the model's error in free motion of "
-            "other logs, which were not fitted. Together they are scaled, by range of speed, so that 95 % of the "
+            "other logs, which were not fitted. Their sum is scaled, for each range of speed, so that 95 % of the "
             "errors in this free motion lie within 1.96 standard deviations. The error of the offset of the day (a "
             "constant effort that differs from day to day) is added if windows without contact determine this offset."
         )
@@ -89,8 +89,8 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     return Table(
         "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
         "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
-        "Over logs: the mean coverage of all logs that were not fitted, with its standard error over logs (over blocks "
-        "of fewer than 3 logs), and the mean half-width of their bands.",
+        "Over logs: the mean coverage of all logs that were not fitted, with its standard error over logs (with "
+        "fewer than 3 logs, over blocks of time), and the mean half-width of their bands.",
         header,
         rows,
         "error-budget",

@@ -28,11 +28,11 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
         "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
         "joint has more than 20 such logs, groups of successive logs are left out together. The chosen model is also "
-        "refitted without blocks of path, and by log only if there are several. If a joint has one log "
+        "refitted without blocks of path and, if there are several logs, without each log. If a joint has one log "
         "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
         "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "after the noise variance is subtracted; its mean is the constant part, as from another payload. Samples at "
+        "after the noise variance is subtracted. Mean: the constant part of this difference, as from another payload. Samples at "
         "which the joint stands still are left out, as friction can then take any value."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]

@@ -88,8 +88,8 @@ def correlations(forces: Sequence[TipForce]) -> str:
     correlated = [force for force in forces if force.correlation_from]
     if not correlated:
         return (
-            "The joints' errors are taken as independent, because their correlation could not be estimated: at least "
-            "two other logs are needed whose correlations in free motion agree."
+            "The joints' errors are taken as independent, because their correlation could not be estimated. That takes "
+            "at least two logs in free motion, besides the log itself, in which the errors correlate alike."
         )
     sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
     return (
