@@ -6,6 +6,8 @@ import tomllib
 
 import pytest
 
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.simulation.study_folder import study_text
 from tests.conftest import ROOT
 from tests.test_robustness import flat
 from tests.test_runs import call
@@ -24,10 +26,25 @@ def test_all_passes_over_each_in_one_line_while_its_recordings_are_absent(tmp_pa
         assert "get them" in flat((ROOT / "raw" / name / "study.toml").read_text().replace("#", "")).lower()
 
 
+def test_all_passes_over_the_thesis_until_it_is_simulated_and_prints_the_command(tmp_path, monkeypatch):
+    text = (ROOT / "raw" / "davinci-thesis" / "study.toml").read_text()
+    assert text == study_text(load("davinci-thesis"))
+    study = tmp_path / "raw" / "davinci-thesis"
+    study.mkdir(parents=True)
+    (study / "study.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    (said,) = call("all").splitlines()
+    assert said.startswith("raw/davinci-thesis: skipped, its logs are missing")
+    assert "`davinci-forces simulate davinci-thesis raw/davinci-thesis`" in said
+    assert [file.name for file in study.iterdir()] == ["study.toml"]
+
+
 def test_no_recording_ships():
     ignored = (ROOT / ".gitignore").read_text().splitlines()
     for name in PUBLIC:
         assert f"raw/{name}/*.csv" in ignored
+    assert {"raw/davinci-thesis/*.tdms", "raw/davinci-thesis/truth.toml"} <= set(ignored)
+    assert {log.file.rpartition(".")[2] for log in load("davinci-thesis").logs} == {"tdms"}
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,7 @@ moved_by = "grip"
 """
 HAPTICS = (PACKAGE / "haptics" / "haptics.toml").read_text(encoding="utf-8").replace("# strongest", "strongest")
 SHIPPED = {f"scenario {name}": (PACKAGE / "simulation" / "shipped" / f"{name}.toml").read_text() for name in
-           ("davinci-demo", "davinci-joints", "davinci-thesis")}  # fmt: skip
+           ("davinci-demo", "davinci-filter", "davinci-joints", "davinci-thesis")}  # fmt: skip
 URDF = """<robot name="r"><link name="a"/>
 <link name="b"><inertial><origin xyz="0.1 0.1 0.1" rpy="0.1 0.1 0.1"/><mass value="1.0"/>
 <inertia ixx="1.0" ixy="0.1" ixz="0.1" iyy="1.0" iyz="0.1" izz="1.0"/></inertial></link>

@@ -203,7 +203,7 @@ def test_a_family_may_give_a_log_another_role():
 
 
 def test_a_name_that_no_scenario_has_is_answered_with_those_there_are():
-    with pytest.raises(BadScenario, match="davinci-demo, davinci-joints, davinci-thesis"):
+    with pytest.raises(BadScenario, match="davinci-demo, davinci-filter, davinci-joints, davinci-thesis"):
         load("davinci")
 
 

@@ -23,6 +23,7 @@ from davinci_forces.simulation.sensors import drift, generator, quantise
 from davinci_forces.stages.model import fit
 from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import Study, reading
+from tests.test_runs import call
 
 app = typer.Typer()
 app.command()(simulate.run)
@@ -190,6 +191,53 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path):
     with pytest.raises(BadRequest, match="is a file"):
         study_folder.write(scenario, tmp_path / "mine" / "thesis.txt", True, lambda _: None)
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
+
+
+def described(tmp_path, text: str | None = None) -> tuple[str, Path]:
+    """A scenario, and a folder that holds its study.toml, or this text, and a note."""
+    scenario, out = short(tmp_path), tmp_path / "short"
+    out.mkdir()
+    (out / "study.toml").write_text(text or study_folder.study_text(load(str(scenario))))
+    (out / "note.txt").write_text("years of work")
+    return str(scenario), out
+
+
+def contents(folder: Path) -> dict[str, tuple[bytes, int]]:
+    return {file.name: (file.read_bytes(), file.stat().st_mtime_ns) for file in folder.iterdir()}
+
+
+def test_logs_and_truth_are_put_beside_the_study_of_the_scenario_and_no_other_file_changes(tmp_path):
+    scenario, out = described(tmp_path)
+    before = contents(out)
+    simulate.run(scenario, out)
+    after = contents(out)
+    assert {name: after.pop(name) for name in before} == before
+    study_folder.write(load(scenario), tmp_path / "new", False, lambda _: None)
+    new = contents(tmp_path / "new")
+    assert {"study.toml": new.pop("study.toml")[0]} == {"study.toml": before["study.toml"][0]}
+    assert {name: content for name, (content, _) in after.items()} == {
+        name: content for name, (content, _) in new.items()
+    }
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "short", "short.toml"]
+
+
+@pytest.mark.parametrize(
+    ("text", "present", "says"),
+    [
+        ("title = 'mine'\n", None, "study.toml is not what short writes"),
+        (None, "log_0.tdms", "log_0.tdms exists already"),
+    ],
+)
+def test_another_study_or_a_log_in_the_folder_is_refused_in_one_message_and_nothing_is_written(
+    tmp_path, text, present, says
+):
+    scenario, out = described(tmp_path, text)
+    if present:
+        (out / present).write_text("recorded")
+    before = contents(out)
+    assert says in call("simulate", scenario, out, code=1).replace("\n", " ")
+    assert contents(out) == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["short", "short.toml"]
 
 
 def test_a_place_that_cannot_be_written_to_is_named(tmp_path):

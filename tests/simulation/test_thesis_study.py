@@ -23,18 +23,29 @@ def test_a_sample_has_the_variance_of_ten_periods_mean_ten_times():
             assert family.noise[joint.name].tau ** 2 == pytest.approx(PERIODS * printed_mse(joint), rel=1e-4)
 
 
-def test_the_families_differ_in_nothing_but_friction():
+def test_parameters_are_identified_from_matched_friction_and_realistic_differs_in_nothing_else():
     scenario = load("davinci-thesis")
     matched, realistic = (scenario.arm.families[name] for name in ("matched", "realistic"))
     assert matched.noise == realistic.noise
-    fitted = {log.family for log in scenario.logs if log.role == "identification"}
-    assert fitted == {"realistic"}
     for joint in ROBOT.joints:
         moving = [log for log in scenario.logs if joint.name in log.moves]
         assert {(log.role, log.family) for log in moving} == {
-            ("identification", "realistic"), ("validation", "realistic"), ("validation", "matched"),
-            ("friction", "matched"),
+            ("identification", "matched"), ("validation", "realistic"), ("validation", "matched"),
+            ("friction", "realistic"),
         }  # fmt: skip
+
+
+def test_section_7_3_has_the_noise_of_table_7_1_a_sinusoid_and_triangles():
+    scenario, thesis = load("davinci-filter"), load("davinci-thesis")
+    log, (exact,) = scenario.logs[1], scenario.arm.families.values()
+    assert (exact.noise["hand_pitch"].q, exact.noise["hand_pitch"].dq, exact.noise["hand_pitch"].tau) == (
+        0.01,
+        0.008,
+        0,
+    )
+    assert [x.tolist() for x in exact.friction] == [x.tolist() for x in thesis.arm.families["matched"].friction]
+    assert len(log.moves["hand_pitch"].b) == 1
+    assert {push.shape for push in log.external["hand_pitch"]} == {"triangle"}
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,10 @@ def run(
     out: Annotated[Path, typer.Argument(help="Folder of the new study.")],
     force: Annotated[bool, typer.Option("--force", help="Replace an existing simulated study.")] = False,
 ) -> None:
-    """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml."""
+    """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml.
+
+    If OUT holds the study.toml of this scenario, logs and truth.toml are written beside it, and no other file changes.
+    """
     from davinci_forces.errors import BadRequest
     from davinci_forces.simulation import study_folder
     from davinci_forces.simulation.scenario.reading import load

@@ -48,7 +48,17 @@ def studies(names: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[
         if len(absent) < study.files:
             yield folder
         elif verbosity != "quiet":
-            echo(f"{folder}: skipped, its logs are missing ({absent[0]} ...); study.toml says where to get them")
+            echo(f"{folder}: skipped, its logs are missing ({absent[0]} ...); {_source(study)}")
+
+
+def _source(study: Study) -> str:
+    """Where the logs of a study come from: a shipped scenario of its name, or what its study.toml says."""
+    from davinci_forces.simulation.scenario.reading import shipped_scenarios
+
+    name = study.folder.name
+    if study.simulated and name in shipped_scenarios():
+        return f"`davinci-forces simulate {name} {study.folder}` writes them"
+    return "study.toml says where to get them"
 
 
 def expand_pattern(name: Path) -> list[Path]:

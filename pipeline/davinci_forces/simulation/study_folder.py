@@ -12,55 +12,75 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.simulation import sensors
-from davinci_forces.simulation.motion import SimulatedRun, mass_position, simulate_log, theta
-from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
+from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, mass_position, simulate_log, theta
+from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
-TRUTH = "truth.toml"
+STUDY, TRUTH = "study.toml", "truth.toml"
 
 
 def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], None]) -> None:
     """Simulate every log, and move the study into place when it is complete; `say` reports each log.
 
+    Without `force`, logs and truth.toml are put beside the scenario's study.toml, and no other file changes.
+
     Raises
     ------
     BadRequest
-        If the folder is not empty, unless it holds a simulated study and `force` is set.
+        If `check` refuses the folder, or it holds another study.toml or a file with the name of a log.
     """
     check(folder, force)
+    text = study_text(scenario)
+    beside = not force and (folder / STUDY).is_file()
+    if beside:
+        _check_study(scenario, folder, text)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as temporary:
         new, old = Path(temporary) / "new", Path(temporary) / "old"
         new.mkdir()
-        entries, truths = zip(*(_log(scenario, log, new, say) for log in scenario.logs), strict=True)
-        _text(new / "study.toml", study_text(scenario, entries))
+        truths = [_log(scenario, log, new, say) for log in scenario.logs]
         _text(new / TRUTH, truth_text(scenario, truths))
-        if folder.exists():
-            folder.rename(old)
-        shutil.move(new, folder)
-    size = sum(file.stat().st_size for file in folder.iterdir())
+        if beside:
+            for file in sorted(new.iterdir()):  # truth.toml is the last
+                file.replace(folder / file.name)
+        else:
+            _text(new / STUDY, text)
+            if folder.exists():
+                folder.rename(old)
+            shutil.move(new, folder)
+    size = sum((folder / log.file).stat().st_size for log in scenario.logs)
     say(f"{folder}: {len(scenario.logs)} simulated logs, {size / 1e6:.2f} MB")
 
 
 def check(folder: Path, force: bool) -> None:
-    """Refuse to replace a folder, except a simulated study with `force`."""
+    """Refuse to replace a folder, except a simulated study with `force`, or to fill one that has no study.toml."""
     if folder.exists() and not folder.is_dir():
         raise BadRequest(f"{folder} is a file; name a folder that does not exist yet")
     if not folder.is_dir() or not any(folder.iterdir()):
         return
-    if not force:
+    simulated = (folder / TRUTH).is_file()
+    if not force and (simulated or not (folder / STUDY).is_file()):
         raise BadRequest(f"{folder} is not empty; name another folder, or replace it with --force")
-    if not (folder / TRUTH).is_file():
+    if force and not simulated:
         raise BadRequest(f"{folder} has no {TRUTH}, so it is not a simulated study; --force does not replace it")
 
 
-def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
+def _check_study(scenario: Scenario, folder: Path, text: str) -> None:
+    """Refuse to put logs beside a study.toml that is not the scenario's, or in place of other files."""
+    if (folder / STUDY).read_text(encoding="utf-8") != text:
+        raise BadRequest(f"{folder / STUDY} is not what {scenario.name} writes; restore it, or name another folder")
+    for log in scenario.logs:
+        if (folder / log.file).exists():
+            raise BadRequest(f"{folder / log.file} exists already; remove it, or name another folder")
+
+
+def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> str:
     run = simulate_log(scenario, log)
-    channels, path = record_channels(scenario, log, run), folder / log.file
-    sensors.write(path, channels, scenario.rate, scenario.started)
+    path = folder / log.file
+    sensors.write(path, record_channels(scenario, log, run), scenario.rate, scenario.started)
     size = path.stat().st_size / 1e6
     say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
-    return study_entry(scenario, log, path, channels), truth_entry(log, run)
+    return truth_entry(log, run)
 
 
 def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
@@ -81,15 +101,18 @@ def _text(file: Path, text: str) -> None:
     file.write_text(text, encoding="utf-8", newline="\n")
 
 
-def study_text(scenario: Scenario, entries: Sequence[str]) -> str:
-    """The text of study.toml."""
+def study_text(scenario: Scenario) -> str:
+    """The text of study.toml, which does not depend on the samples."""
     head = f"title = {toml(scenario.title)}\nrobot = {toml(scenario.robot.name)}\nsimulated = true\n"
     head += f"\n[settings]\nharmonics = {scenario.harmonics}\n" if scenario.harmonics else ""
+    entries = (study_entry(scenario, log) for log in scenario.logs)
     return "# Written by `davinci-forces simulate`: simulated data.\n" + "\n".join([head, *entries])
 
 
-def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Sequence[SimulatedChannel]) -> str:
+def study_entry(scenario: Scenario, log: SimulatedLog) -> str:
     """The [[log]] of one recording in study.toml."""
+    path, t = Path(log.file), np.zeros(2)
+    at_rest = SimulatedRun(t, {name: SimulatedMotion(t, t, t, t) for name in log.joints}, np.zeros((2, 3)))
     lines = ["[[log]]", f"name = {toml(log.name)}", f"file = {toml(log.file)}", f"role = {toml(log.role)}"]
     periods = {move.period for move in log.moves.values() if isinstance(move, Fourier)}
     if len(periods) == 1 and log.role in ("identification", "validation"):
@@ -103,7 +126,7 @@ def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Seq
         joint = toml(scenario.robot.joints[-1].name)
         lines.append(f"weight = {{ mass = {toml(log.mass)}, moves_with = {joint}, position = {toml(place)} }}")
     lines.append("[log.channels]")
-    for channel in channels:
+    for channel in record_channels(scenario, log, at_rest):
         name = toml(sensors.channel_name(path, channel))
         if channel.quantity == "time":
             lines.append(f"time = {name}")
