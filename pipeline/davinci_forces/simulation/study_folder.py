@@ -41,8 +41,8 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
         truths = [_log(scenario, log, new, say) for log in scenario.logs]
         _text(new / TRUTH, truth_text(scenario, truths))
         if beside:
-            for file in sorted(new.iterdir()):  # truth.toml is the last
-                file.replace(folder / file.name)
+            for name in (*(log.file for log in scenario.logs), TRUTH):
+                (new / name).replace(folder / name)
         else:
             _text(new / STUDY, text)
             if folder.exists():
@@ -67,10 +67,11 @@ def check(folder: Path, force: bool) -> None:
 
 def _check_study(scenario: Scenario, folder: Path, text: str) -> None:
     """Refuse to put logs beside a study.toml that is not the scenario's, or in place of other files."""
-    if (folder / STUDY).read_text(encoding="utf-8") != text:
+    if (folder / STUDY).read_text(encoding="utf-8", errors="replace") != text:
         raise BadRequest(f"{folder / STUDY} is not what {scenario.name} writes; restore it, or name another folder")
+    present = {file.name for file in folder.iterdir()}  # links to nothing, too
     for log in scenario.logs:
-        if (folder / log.file).exists():
+        if log.file in present:
             raise BadRequest(f"{folder / log.file} exists already; remove it, or name another folder")
 
 
