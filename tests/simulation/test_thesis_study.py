@@ -88,5 +88,3 @@ def test_realistic_friction_adds_to_the_model_error(study, results):
             for family in ("matched", "realistic")
         )
         assert realistic > 1.5 * exact
-    page = (study.parent.parent / "reports" / "davinci-thesis" / "report.html").read_text()
-    assert "Model error by the friction of logs not fitted." in page

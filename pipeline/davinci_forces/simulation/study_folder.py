@@ -13,7 +13,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, mass_position, simulate_log, theta
-from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
+from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
 STUDY, TRUTH = "study.toml", "truth.toml"

@@ -45,7 +45,7 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     )
     yield Prose(
         "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
-        "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on at least four "
+        "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on four or more "
         "of the six parts of the path. The model after the earliest step whose error is within one standard error of "
         "the least is taken. Then joints share the links' parameters, unless that is clearly "
         "worse. The search is used if its result has a lower error than the best candidate with fixed terms."

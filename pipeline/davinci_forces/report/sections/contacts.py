@@ -27,8 +27,8 @@ def blocks(context: Context) -> Iterator[Block]:
             "motion crosses this level at most once in ten minutes. Each contact has an onset, a release, a peak (the "
             "largest external effort), a mean and an impulse (effort times time). The standard error of each "
             "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
-            "includes the smoother's standard deviation at that peak, and the height by which the smoother flattens it; that of a "
-            "mean also includes what the smoother spreads out of the window. A contact "
+            "includes the smoother's standard deviation at that peak, and the height by which the smoother flattens "
+            "it; that of a mean also includes what the smoother spreads out of the window. A contact "
             "is detected if its peak exceeds the joint's detection level: 99 % of the samples of the joint's worst run "
             "in free space stay below this level."
         )

@@ -32,8 +32,8 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
         "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "after the noise variance is subtracted. Mean: the constant part of this difference, as from another payload. Samples at "
-        "which the joint stands still are left out, as friction can then take any value."
+        "after the noise variance is subtracted. Mean: the constant part of this difference, as from another payload. "
+        "Samples at which the joint stands still are left out, as friction can then take any value."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")

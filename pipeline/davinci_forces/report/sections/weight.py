@@ -97,7 +97,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": ". The study states no mass, so the scale of the efforts is not known.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor.",
-        "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale of the efforts.",
+        "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
@@ -157,9 +157,9 @@ def by_joint(context: Context, weight: Weight) -> Table:
     return Table(
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at the stated position and "
         "mirrored. False mass: the root mean square of the mass that the joint shows in free motion without one; the "
-        f"standard error includes it. If the joints agree, their chi-square has a probability of {agree} ({mirrored} mirrored); below "
-        "0.01 they contradict each other. Also the joint's offset of the day, and the root mean squares of the "
-        "residual with the mass and of the model's error in free motion.",
+        "standard error includes it. If the joints agree, their chi-square has a probability of "
+        f"{agree} ({mirrored} mirrored); below 0.01 they contradict each other. Also the offset of the day, and "
+        "the root mean squares of the residual with the mass and of the model's error in free motion.",
         ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion"),
         rows,
         f"weight-joints-{weight.log}",
