@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["read", "results", "run"]
+    from davinci_forces.robots.robot import Robot
+
+__all__ = ["read", "results", "robot", "run"]
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
@@ -25,6 +27,22 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
     from davinci_forces.runner.results.dataframes import read as read_frames
 
     return read_frames(Path(study), record, about)
+
+
+def robot(name: str | Path, folder: str | Path = ".") -> "Robot":
+    """Load a listed robot by its name, or a .toml or .urdf file in the folder: `robot("davinci").mass_matrix([0, 0, 0])`.
+
+    A robot with known geometry has `tip` and `jacobian`; with known masses, `mass_matrix`, `coriolis_matrix`,
+    `gravity`, `inverse_dynamics`, `forward_dynamics` and `energy`.  All take positions (..., n) in rad and m.
+
+    Raises
+    ------
+    BadRobot
+        If there is no such robot or file, or the file has problems; the message lists each with its line.
+    """
+    from davinci_forces.robots import load
+
+    return load(str(name), Path(folder))
 
 
 def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:

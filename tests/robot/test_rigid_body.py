@@ -1,12 +1,17 @@
 """The dynamics of the links, against a Lagrangian that shares nothing with them, and against their own laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import davinci_forces
+from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.robots import dvrk_psm
+from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
 from tests.robot import lagrangian
 from tests.robot import thesis_matrices as thesis
@@ -148,3 +153,44 @@ def test_parameters_and_bodies_are_two_ways_of_saying_the_same():
     np.testing.assert_allclose(again.masses, BODIES.masses)
     np.testing.assert_allclose(again.centres, BODIES.centres, atol=1e-15)
     np.testing.assert_allclose(again.inertias, BODIES.inertias, atol=1e-15)
+
+
+def test_forward_dynamics_inverts_inverse_dynamics():
+    q, dq, ddq = motions(6)
+    tau = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq)
+    np.testing.assert_allclose(rigid_body.forward_dynamics(CHAIN, BODIES, q, dq, tau), ddq, rtol=0, atol=1e-6)
+
+
+@SIZES
+def test_the_coriolis_matrix_makes_the_derivative_of_m_less_twice_it_skew(n):
+    q, dq, _ = motions(n, 20)
+    C, h = rigid_body.coriolis_matrix(CHAIN, BODIES, q, dq), 1e-5
+    np.testing.assert_allclose(
+        np.einsum("sij,sj->si", C, dq), rigid_body.coriolis(CHAIN, BODIES, q, dq), rtol=0, atol=1e-12
+    )
+    ahead, behind = (rigid_body.mass_matrix(CHAIN, BODIES, q + sign * h * dq) for sign in (1, -1))
+    S = (ahead - behind) / (2 * h) - 2 * C
+    np.testing.assert_allclose(S, -S.swapaxes(1, 2), rtol=0, atol=1e-8)
+
+
+def test_power_in_is_the_growth_of_energy_on_a_turned_base():
+    arm = ROBOT.with_base((0.3, -0.4, 0.5))
+    q, dq, tau = motions(3, 50)
+    ddq, h = arm.forward_dynamics(q, dq, tau), 1e-5
+    ahead, behind = (sum(arm.energy(q + s * dq + s**2 / 2 * ddq, dq + s * ddq)) for s in (h, -h))
+    np.testing.assert_allclose((ahead - behind) / (2 * h), (tau * dq).sum(-1), rtol=0, atol=1e-6)
+
+
+def test_potential_energy_rises_by_the_effort_that_holds_the_arm():
+    q = motions(6, 20)[0]
+    for i in range(6):
+        step = 1e-5 * np.eye(6)[i]
+        rise = ROBOT.energy(q + step, q)[1] - ROBOT.energy(q - step, q)[1]
+        np.testing.assert_allclose(rise / 2e-5, ROBOT.gravity(q)[:, i], rtol=0, atol=1e-6)
+
+
+def test_a_robot_says_what_it_does_not_know():
+    with pytest.raises(BadRobot, match="geometry is not known"):
+        replace(ROBOT, chain=None).tip([0, 0, 0])
+    with pytest.raises(BadRobot, match="masses of its links are not known"):
+        davinci_forces.robot("dvrk_psm").gravity([0, 0, 0])

@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
+from numpy.typing import ArrayLike
+
 from davinci_forces.errors import BadRobot
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.placed import transform
-from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
 from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia, lifted_mass, offset
 
@@ -175,9 +178,67 @@ class Robot:
         chain = replace(self.chain, up=(x, y, z))
         if math.isclose(z, 1.0, rel_tol=0, abs_tol=1e-12):
             return self
-        joints = zip(self.joints, loaded_by_gravity(chain)[: len(self.joints)], strict=True)
+        joints = zip(self.joints, rigid_body.loaded_by_gravity(chain)[: len(self.joints)], strict=True)
         turned = (replace(j, terms=j.terms_under_gravity(loaded), physical=None, printed=None) for j, loaded in joints)
         return replace(self, chain=chain, joints=tuple(turned))
+
+    def tip(self, q: ArrayLike) -> Array:
+        """Position of the tip (..., 3) [m] in base axes."""
+        return kinematics.tip(self.known_chain, q)
+
+    def jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
+        """J_v and J_omega (..., 3, n) of the tip in base axes.  (7.21)-(7.24)"""
+        return kinematics.jacobian(self.known_chain, q)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """M (..., n, n) of the links.  (4.38)"""
+        return rigid_body.mass_matrix(self.known_chain, self.known_bodies, q)
+
+    def coriolis_matrix(self, q: ArrayLike, dq: ArrayLike) -> Array:
+        """C (..., n, n) of the Christoffel symbols, for which dM/dt - 2 C is skew-symmetric.  (5.6), (5.12)"""
+        return rigid_body.coriolis_matrix(self.known_chain, self.known_bodies, q, dq)
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """G (..., n): the effort that holds the arm still.  (4.38)"""
+        return rigid_body.gravity(self.known_chain, self.known_bodies, q)
+
+    def inverse_dynamics(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """The effort tau (..., n) of the links in this motion, without friction and contact.  (4.38)"""
+        return rigid_body.inverse_dynamics(self.known_chain, self.known_bodies, q, dq, ddq)
+
+    def forward_dynamics(self, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Array:
+        """The acceleration ddq (..., n) of the links under efforts tau, without friction and contact.  (4.41)"""
+        return rigid_body.forward_dynamics(self.known_chain, self.known_bodies, q, dq, tau)
+
+    def energy(self, q: ArrayLike, dq: ArrayLike) -> tuple[Array, Array]:
+        """Kinetic and potential energy (...,) [J]; the potential energy is 0 at the base's origin.  (4.12)-(4.15)"""
+        return rigid_body.energy(self.known_chain, self.known_bodies, q, dq)
+
+    @property
+    def known_chain(self) -> Chain:
+        """The chain.
+
+        Raises
+        ------
+        BadRobot
+            If the robot's geometry is not known.
+        """
+        if self.chain is None:
+            raise BadRobot(f"robot {self.name} has no chain: its geometry is not known; use a URDF, or add [[link]]")
+        return self.chain
+
+    @property
+    def known_bodies(self) -> Bodies:
+        """The bodies.
+
+        Raises
+        ------
+        BadRobot
+            If the masses of the robot's links are not known.
+        """
+        if self.bodies is None:
+            raise BadRobot(f"robot {self.name} has no bodies: the masses of its links are not known")
+        return self.bodies
 
     @property
     def coordinates(self) -> tuple[str, ...]:

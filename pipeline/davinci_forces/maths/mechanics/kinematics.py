@@ -16,10 +16,10 @@ POSES_AT_ONCE = 1 << 14
 
 def frames(chain: Chain, q: ArrayLike) -> Array:
     """The pose of every named frame in the base frame, homogeneous matrices (..., F, 4, 4) [m].  (3.6), (4.30)"""
-    return np.asarray(_bodies(chain, np.asarray(q, float))[..., chain.body, :, :] @ chain.offset)
+    return np.asarray(poses_of_bodies(chain, np.asarray(q, float))[..., chain.body, :, :] @ chain.offset)
 
 
-def _bodies(chain: Chain, q: Array) -> Array:
+def poses_of_bodies(chain: Chain, q: Array) -> Array:
     """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
     chain = chain.with_coordinates(q.shape[-1])
     moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
@@ -39,7 +39,7 @@ def _bodies(chain: Chain, q: Array) -> Array:
 def tip(chain: Chain, q: ArrayLike) -> Array:
     """Position of the tip (..., 3) [m], the origin of frame 9L of the da Vinci."""
     index = chain.names.index(chain.tip)
-    body = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
+    body = poses_of_bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
     return np.asarray((body @ chain.offset[index])[..., :3, 3])
 
 
@@ -53,7 +53,7 @@ def jacobian(
     """
     q = np.asarray(q, float)
     index = chain.names.index(frame or chain.tip)
-    bodies, body = _bodies(chain, q), int(chain.body[index])
+    bodies, body = poses_of_bodies(chain, q), int(chain.body[index])
     T = bodies[..., body, :, :] @ chain.offset[index]
     return _jacobian(chain, bodies, q.shape[-1], body, T[..., :3, :3] @ np.asarray(point, float) + T[..., :3, 3])
 
@@ -89,6 +89,6 @@ def remote_centre(chain: Chain) -> Array:
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
-    v, w = (J.T for J in _jacobian(chain, _bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
+    v, w = (J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

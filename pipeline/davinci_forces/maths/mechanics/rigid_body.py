@@ -14,6 +14,7 @@ from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics import recursions
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
+from davinci_forces.maths.mechanics.kinematics import poses_of_bodies
 
 ALL = (slice(None),)  # index of all samples, for numpy
 RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
@@ -49,6 +50,36 @@ def coriolis(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array
     """C dq (..., n): centrifugal and Coriolis efforts.  (4.38)"""
     q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
     return _newton_euler(moving_tree(chain, bodies, q.shape[-1]), 0.0, q, dq, np.zeros_like(q))
+
+
+def coriolis_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array:
+    """C (..., n, n) of the Christoffel symbols, for which dM/dt - 2 C is skew-symmetric.  (5.6), (5.12)
+
+    C dq is a quadratic form of dq; column j is its bilinear form of dq and the unit velocity of coordinate j.
+    """
+    q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
+    units = np.eye(q.shape[-1])
+    columns = coriolis(chain, bodies, q[..., None, :], np.stack([dq[..., None, :] + units, dq[..., None, :] - units]))
+    return np.swapaxes(columns[0] - columns[1], -1, -2) / 4
+
+
+def forward_dynamics(
+    chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, tau: ArrayLike, drives: Drives | None = None
+) -> Array:
+    """The acceleration ddq (..., n) that efforts tau cause, without contact.  (4.41)"""
+    bias = inverse_dynamics(chain, bodies, q, dq, np.zeros(np.shape(q)), drives)
+    M = mass_matrix(chain, bodies, q, drives)
+    return np.asarray(np.linalg.solve(M, (np.asarray(tau, float) - bias)[..., None])[..., 0])
+
+
+def energy(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> tuple[Array, Array]:
+    """Kinetic and potential energy (...,) [J]; the potential energy is 0 at the origin of the base.  (4.12)-(4.15)"""
+    q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
+    pi = bodies.parameters(q.shape[-1]).reshape(-1, 10)
+    T = poses_of_bodies(chain, q)[..., 1:, :, :]
+    moment = np.einsum("l,...li->...i", pi[:, 0], T[..., :3, 3]) + np.einsum("...lij,lj->...i", T[..., :3, :3], pi[:, 1:4])
+    kinetic = np.einsum("...i,...ij,...j->...", dq, mass_matrix(chain, bodies, q), dq) / 2
+    return np.asarray(kinetic), np.asarray(GRAVITY * moment @ np.array(chain.up))
 
 
 def inverse_dynamics(
