@@ -246,6 +246,7 @@ OPENS = {  # a module that opens files otherwise than through `files`, and why i
     "report/writers/html.py": "the package's own templates",
     "report/writers/typesetting.py": "the package's own templates",
     "simulation/scenario/reading.py": "the package's own scenarios",
+    "simulation/thesis.py": "the package's own index",
     "commands/haptics.py": "the package's own scenario",
     "runner/processes/arithmetic.py": "what Linux says of the processor",
     "runner/lock.py": "its own lock, which may be no file, and what Linux says of processes",

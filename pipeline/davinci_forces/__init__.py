@@ -30,7 +30,7 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
 
 
 def robot(name: str | Path, folder: str | Path = ".") -> "Robot":
-    """Load a listed robot by its name, or a .toml or .urdf file in the folder: `robot("davinci").mass_matrix([0, 0, 0])`.
+    """Load a listed robot by its name, or a .toml or .urdf file in the folder: `robot("davinci").gravity([0, 0, 0])`.
 
     A robot with known geometry has `tip` and `jacobian`; with known masses, `mass_matrix`, `coriolis_matrix`,
     `gravity`, `inverse_dynamics`, `forward_dynamics` and `energy`.  All take positions (..., n) in rad and m.

@@ -26,6 +26,10 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
+    thesis: Annotated[
+        bool,
+        typer.Option("--thesis", help="Print where each table, figure and equation of the thesis is (davinci only)."),
+    ] = False,
 ) -> None:
     """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.
 
@@ -34,6 +38,9 @@ def run(
     from davinci_forces.robots import load
 
     arm = load(robot, Path())
+    if thesis:
+        echo(_index(arm))
+        return
     if urdf:
         from davinci_forces.robots.urdf import writing
 
@@ -43,6 +50,21 @@ def run(
     q = _values("--at", at) if at is not None else [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
     document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
     echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
+
+
+def _index(robot: "Robot") -> str:
+    """The thesis chapter by chapter, with the results of `davinci-thesis` in `reports/` if it has run."""
+    from davinci_forces.errors import BadRequest, MissingRecord
+    from davinci_forces.runner.results.dataframes import results
+    from davinci_forces.simulation import thesis
+
+    if robot.name != "davinci":
+        raise BadRequest(f"--thesis is about the robot davinci, not {robot.name}")
+    try:
+        table = results(Path("raw/davinci-thesis"))
+    except MissingRecord:
+        return thesis.text({})
+    return thesis.text({key: (value, std) for key, value, std in table[["value", "std"]].itertuples()})
 
 
 def _values(option: str, text: str) -> list[float]:

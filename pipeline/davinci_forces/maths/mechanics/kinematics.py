@@ -89,6 +89,8 @@ def remote_centre(chain: Chain) -> Array:
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
-    v, w = (J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
+    v, w = (
+        J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3))
+    )  # v + w x p = 0 for both
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

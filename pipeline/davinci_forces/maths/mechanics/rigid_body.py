@@ -60,7 +60,7 @@ def coriolis_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -
     q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
     units = np.eye(q.shape[-1])
     columns = coriolis(chain, bodies, q[..., None, :], np.stack([dq[..., None, :] + units, dq[..., None, :] - units]))
-    return np.swapaxes(columns[0] - columns[1], -1, -2) / 4
+    return np.asarray(np.swapaxes(columns[0] - columns[1], -1, -2) / 4)
 
 
 def forward_dynamics(
@@ -77,7 +77,9 @@ def energy(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> tuple[A
     q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
     pi = bodies.parameters(q.shape[-1]).reshape(-1, 10)
     T = poses_of_bodies(chain, q)[..., 1:, :, :]
-    moment = np.einsum("l,...li->...i", pi[:, 0], T[..., :3, 3]) + np.einsum("...lij,lj->...i", T[..., :3, :3], pi[:, 1:4])
+    moment = np.einsum("l,...li->...i", pi[:, 0], T[..., :3, 3]) + np.einsum(
+        "...lij,lj->...i", T[..., :3, :3], pi[:, 1:4]
+    )
     kinetic = np.einsum("...i,...ij,...j->...", dq, mass_matrix(chain, bodies, q), dq) / 2
     return np.asarray(kinetic), np.asarray(GRAVITY * moment @ np.array(chain.up))
 

@@ -36,7 +36,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "review",
         ),
     ),
-    "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
+    "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation", "thesis")),
 }
 SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.maths.arrays import evenly
 from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
 from davinci_forces.report.content import (
     Bars,
@@ -17,14 +16,13 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Reference,
     Section,
     Table,
     Verdict,
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation, run_name
+from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_name
 from davinci_forces.report.verdicts import MAX_PERIOD_NOISE
 
 NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
@@ -201,13 +199,7 @@ def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str
     edges, densities, grid, normal = histogram(residual.tau_noise)
     shape = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
     yield Panel("Effort noise", label(residual, "tau_noise", "effort"), "density", shape)
-    scores, ordered, slope, middle = normal_scores(residual.q_noise)
-    yield Panel(
-        "Position noise",
-        "normal quantile",
-        label(residual, "q_noise", "position"),
-        (Points(scores, ordered, "", "blue"), Reference(slope, middle, "normal", "vermillion")),
-    )
+    yield normal_plot("Position noise", residual.q_noise, label(residual, "q_noise", "position"))
     if w := whiteness.get("dq_noise"):
         yield autocorrelation(w, "Velocity noise")
 
@@ -219,18 +211,3 @@ def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column
     sigma = float(x.std()) or 1.0
     normal = np.exp(-0.5 * ((grid - x.mean()) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
     return edges, densities, grid, normal
-
-
-def normal_scores(x: Column) -> tuple[Column, Column, float, float]:
-    """A normal probability plot: theoretical quantiles, ordered values, and the line through the quartiles.
-
-    At most 500 points, evenly spread over the order, as more cannot be told apart on paper.
-    """
-    from scipy.stats import norm
-
-    ordered = np.sort(x)
-    scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
-    shown = evenly(len(x), 500)
-    low, high = np.quantile(x, [0.25, 0.75])
-    slope = (high - low) / (2 * norm.ppf(0.75))
-    return scores[shown], ordered[shown], float(slope), float((low + high) / 2)

@@ -3,8 +3,24 @@
 import re
 from collections.abc import Iterator, Sequence
 
-from davinci_forces.records import Prediction, Residual, Track, Whiteness
-from davinci_forces.report.content import AnyMark, Block, HBand, Line, OnScreen, Panel, Stems, Table, VSpan, literal
+import numpy as np
+
+from davinci_forces.maths.arrays import evenly
+from davinci_forces.records import Column, Prediction, Residual, Track, Whiteness
+from davinci_forces.report.content import (
+    AnyMark,
+    Block,
+    HBand,
+    Line,
+    OnScreen,
+    Panel,
+    Points,
+    Reference,
+    Stems,
+    Table,
+    VSpan,
+    literal,
+)
 from davinci_forces.report.context import Context, label, title
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
@@ -78,3 +94,19 @@ def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:
     reach = max(4 * w.band, 0.1)
     low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))
     return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))
+
+
+def normal_plot(title: str, x: Column, axis: str) -> Panel:
+    """A normal probability plot: ordered values over theoretical quantiles, and the line through the quartiles.
+
+    At most 500 points, evenly spread over the order, as more cannot be told apart on paper.
+    """
+    from scipy.stats import norm
+
+    ordered = np.sort(x)
+    scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
+    shown = evenly(len(x), 500)
+    low, high = np.quantile(x, [0.25, 0.75])
+    slope = (high - low) / (2 * norm.ppf(0.75))
+    line = Reference(float(slope), float((low + high) / 2), "normal", "vermillion")
+    return Panel(title, "normal quantile", axis, (Points(scores[shown], ordered[shown], "", "blue"), line))

@@ -8,7 +8,7 @@ from davinci_forces.records import Column, Counts, Residual, Trajectory, Whitene
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Figure, HBand, Line, Panel, Points, Prose
 from davinci_forces.report.context import Context, fit_name, label
-from davinci_forces.report.sections.parts import autocorrelation, effort_panel, run_name
+from davinci_forces.report.sections.parts import autocorrelation, effort_panel, normal_plot, run_name
 from davinci_forces.report.verdicts import percent
 
 LAGS = 50  # lags of the cross-correlation on either side
@@ -28,14 +28,15 @@ def residual_blocks(context: Context, residual: Residual, label_end: str = "") -
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
     yield Figure(
-        f"{name}: averaged effort and model ({who}), and the residual of the model.",
+        f"{name}: averaged effort and model ({who}), the residual of the model, and its normal probability plot.",
         f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
         (
             effort_panel(residual, heading="Averaged effort and model"),
             Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+            normal_plot("Residual", errors, label(residual, "tau", "residual")),
         ),
         f"fit-figure-{place}",
-        columns=2,
+        columns=3,
         height=34,
     )
     moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)

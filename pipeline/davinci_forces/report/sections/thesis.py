@@ -1,0 +1,33 @@
+"""The thesis chapter by chapter: where each table, figure and equation is here, and its numbers beside ours."""
+
+from collections.abc import Iterator
+
+from davinci_forces.report.content import Block, Prose, Section, Table, literal
+from davinci_forces.report.context import Context
+from davinci_forces.simulation.thesis import PrintedNumbers, chapters, in_words, numbers
+
+STUDY = "davinci-thesis"  # of the thesis's identification
+
+
+def section(context: Context) -> Section | None:
+    """The index of the thesis; None for recordings and other simulations."""
+    compares = context.compares_with_thesis
+    return Section("The thesis, chapter by chapter", "thesis", tuple(blocks(context))) if compares else None
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """A table for each chapter, and one of the printed numbers."""
+    of_thesis = context.study.truth.get("scenario") == STUDY
+    results = {key: (result.value, result.std or 0.0) for key, result in context.results.items() if of_thesis}
+    compared = numbers(results)
+    yield Prose(in_words(compared))
+    for chapter in chapters():
+        rows = tuple((literal(row.item), literal(row.shows), row.here, literal(row.differs)) for row in chapter.rows)
+        yield Table(f"Chapter {chapter.title}.", ("Item", "Shows", "Here", "Differs"), rows, align="llll")
+    header = ("Item", "Numbers", "Printed", "Here", "Why")
+    yield Table("Numbers of the thesis, as printed and here.", header, tuple(map(number_row, compared)), align="lllll")
+
+
+def number_row(x: PrintedNumbers) -> tuple[str, ...]:
+    """Printed numbers beside ours; only those that differ are repeated."""
+    return (literal(x.item), literal(x.name), x.printed_text, x.here_text, literal(x.why if x.differ.any() else ""))
