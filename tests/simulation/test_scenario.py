@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from davinci_forces import robots
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.surroundings import Path
 from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.simulation.motion import simulate_log
 from davinci_forces.simulation.scenario.reading import _scenario, load, shipped_scenarios
 from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.sensors import record_force
@@ -194,6 +196,30 @@ def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
     assert isinstance(law, Regulator)
     assert law.derivative.tolist() == [4.0, 5.0, 6.0]
     assert law.gravity == 0.9
+
+
+def test_an_arm_without_control_falls_as_its_forward_dynamics_say(tmp_path):
+    text = TWO_ARMS
+    start, end = text.index("[arm.control]"), text.index("[family.matched.hand_roll]")
+    scenario = read(tmp_path, text[:start] + '[arm.control]\nlaw = "none"\n' + text[end:])
+    entry = next(log for log in scenario.logs if log.name == "matched-pitch-excitation")
+    family = scenario.arm.families["matched"]
+    none = {name: np.zeros(3) for name in family.friction._fields if name != "stribeck_velocity"}
+    smooth = replace(family, friction=family.friction._replace(**none))
+    scenario = replace(scenario, arm=replace(scenario.arm, families={"matched": smooth}))
+    motion = simulate_log(scenario, replace(entry, lead=0.0, duration=0.3)).motions["hand_pitch"]
+    rotors = np.diag(scenario.arm.motors.gear_ratio**2 * scenario.arm.rotors)
+
+    def slope(_, x):
+        M, bias = ROBOT.mass_matrix(x[:3]) + rotors, ROBOT.inverse_dynamics(x[:3], x[3:], np.zeros(3))
+        return np.concatenate([x[3:], np.linalg.solve(M, -bias)])
+
+    t = np.arange(len(motion.q)) / scenario.rate
+    true = solve_ivp(slope, (0, t[-1]), [0, motion.q[0], 0, 0, 0, 0], t_eval=t, rtol=1e-8).y[1]
+    fall = abs(true[-1] - true[0])
+    assert fall > 0.005
+    np.testing.assert_allclose(motion.q, true, atol=0.01 * fall)
+    assert not motion.tau.any()
 
 
 def test_a_family_may_give_a_log_another_role():

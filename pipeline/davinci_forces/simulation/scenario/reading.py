@@ -132,9 +132,12 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
 
 
 def _control(table: TomlTable, n: int) -> Cascade | Regulator:
-    """Read the control law: the laboratory's cascade, or the PID with gravity compensation of chapter 5."""
+    """Read the control law: the laboratory's cascade, PID with gravity compensation (chapter 5), or none (Fig 4.5)."""
     law: Cascade | Regulator
-    if table.text("law", "cascade", ("cascade", "pid")) == "pid":
+    name = table.text("law", "cascade", ("cascade", "pid", "none"))
+    if name == "none":
+        law = Regulator(np.zeros(n), np.zeros(n), np.zeros(n), 0.0)
+    elif name == "pid":
         proportional, derivative, integral = (
             _list(table, key, n) for key in ("proportional", "derivative", "integral")
         )
