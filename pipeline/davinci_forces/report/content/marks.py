@@ -196,7 +196,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Line3D(Mark):
-    """A curve in space."""
+    """A curve in space; an `arrow` has a head at its end."""
 
     x: Array
     y: Array
@@ -204,6 +204,7 @@ class Line3D(Mark):
     label: str = ""
     colour: Colour = ""
     style: Style = ""
+    arrow: bool = False
 
 
 @dataclass(frozen=True, eq=False)

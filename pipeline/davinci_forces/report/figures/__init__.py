@@ -1,1 +1,1 @@
-"""Draw figures from data with matplotlib: panels, marks, ticks and colours."""
+"""Draw figures from data as SVG: panels, marks, ticks and colours."""

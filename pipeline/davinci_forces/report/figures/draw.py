@@ -1,12 +1,13 @@
-"""Draw each mark with matplotlib: one function per mark, all with the same arguments."""
+"""Draw each mark of a panel as SVG: one case per mark."""
 
 from collections.abc import Sequence
-from functools import singledispatch
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content.marks import (
+    AnyMark,
     Band,
     Bars,
     HBand,
@@ -23,169 +24,168 @@ from davinci_forces.report.content.marks import (
     VSpan,
 )
 from davinci_forces.report.content.number import MINUS
-from davinci_forces.report.figures.palette import COLOURS, SURROUNDINGS
+from davinci_forces.report.figures.palette import AXES, COLOURS, WORDS
+from davinci_forces.report.figures.shapes import SMALL_SIZE, path, symbols, trace, words
+from davinci_forces.report.figures.ticks import Axis
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from mpl_toolkits.mplot3d import Axes3D
-
-DASHES: dict[str, Any] = {
-    "solid": "-",
-    "dashed": (0, (4, 1.6)),
-    "dotted": (0, (1, 1.4)),
-    "dashdot": (0, (5, 1.4, 1, 1.4)),
-}
-BAR_WIDTH = 0.9  # [pt] width of a line or an error bar
+LINE_WIDTH, THIN_WIDTH = 0.9, 0.5  # [pt] widths of lines
+DASH_LENGTHS = {"dashed": "3.6,1.5", "dotted": "0.9,1.3", "dashdot": "4.5,1.3,0.9,1.3"}
+OPACITIES = {Band: 0.25, HBand: 0.22, VSpan: 0.18, Histogram: 0.75}
+SYMBOL_SIZE, BAR_END = 2.6, 2.0  # [pt] diameter of a point, half-width of the ends of an error bar
 MANY = 60  # more stems than this are thin and have no heads, so that marks behind them stay visible
+BARS_WIDTH, BAR_SHARE = 0.8, 0.92  # of the distance of two names: all bars of a name; of its place: one bar
+TILE = 0.96  # of its place: one tile
 
 
-def escape_label(text: str) -> str:
-    """A label that matplotlib keeps even when it begins with an underscore; `unescape_label` undoes it."""
-    return f" {text}" if text else ""
+class Frame(NamedTuple):
+    """The place of a pair of axes [pt], from the top left corner."""
+
+    x: Axis
+    y: Axis
+    left: float
+    top: float
+    width: float
+    height: float
+
+    def place_x(self, x: Array | Sequence[float]) -> Array:
+        """Values of x as places [pt]."""
+        return self.left + self.width * self.x.share(x)
+
+    def place_y(self, y: Array | Sequence[float]) -> Array:
+        """Values of y as places [pt]."""
+        return self.top + self.height * (1.0 - self.y.share(y))
+
+    def outline(self, x: Array | Sequence[float], y: Array | Sequence[float], closed: bool = False) -> str:
+        """The path through values."""
+        return trace(self.place_x(x), self.place_y(y), closed)
+
+    def box(self, left: float, right: float, low: float, high: float) -> str:
+        """The path round a rectangle of values; an infinite end is that of the axes."""
+        xs = np.clip([left, right], min(self.x.low, self.x.high), max(self.x.low, self.x.high))
+        ys = np.clip([low, high], min(self.y.low, self.y.high), max(self.y.low, self.y.high))
+        return self.outline(xs[[0, 1, 1, 0]], ys[[0, 0, 1, 1]], closed=True)
 
 
-def unescape_label(text: str) -> str:
-    """The text that was passed to `escape_label`."""
-    return text.removeprefix(" ")
+def stroke(colour: str, width: float = LINE_WIDTH, style: str = "solid") -> str:
+    """The style of a line."""
+    dashes = f"; stroke-dasharray: {DASH_LENGTHS[style]}" if style in DASH_LENGTHS else ""
+    return f"fill: none; stroke: {colour}; stroke-width: {width:g}{dashes}"
 
 
-@singledispatch
-def draw_mark(mark: Any, axes: "Axes", order: float) -> None:
-    """Draw one mark on matplotlib axes, with the colour and style that it states."""
+def dots(colour: str, size: float = SYMBOL_SIZE) -> str:
+    """The style of a path whose points are symbols."""
+    return f"fill: none; stroke: {colour}; stroke-width: {size:g}; stroke-linecap: round"
+
+
+def fill(colour: str, opacity: float) -> str:
+    """The style of an area."""
+    return f"fill: {colour}; fill-opacity: {opacity:g}; stroke: none"
+
+
+def draw_mark(mark: AnyMark, frame: Frame) -> tuple[str, str]:
+    """A mark behind the lines and in front of them, as SVG."""
+    colour = COLOURS[mark.colour]
+    match mark:
+        case Line():
+            return "", path(frame.outline(mark.x, mark.y), stroke(colour, style=mark.style))
+        case Points():
+            return "", draw_points(mark, frame)
+        case Band():
+            x, y = np.r_[mark.x, mark.x[::-1]], np.r_[mark.upper, mark.lower[::-1]]
+            return path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[Band])), ""
+        case Stems():
+            return "", draw_stems(mark, frame)
+        case Histogram():
+            x, y = np.repeat(mark.edges, 2), np.r_[0.0, np.repeat(mark.counts, 2), 0.0]
+            return "", path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[Histogram]))
+        case HLine():
+            return "", path(frame.outline([frame.x.low, frame.x.high], [mark.y] * 2), stroke(colour, style=mark.style))
+        case VLine():
+            return "", path(frame.outline([mark.x] * 2, [frame.y.low, frame.y.high]), stroke(colour, style=mark.style))
+        case HBand():
+            ends = [frame.x.low, frame.x.high]
+            edges = "".join(frame.outline(ends, [level] * 2) for level in (mark.lower, mark.upper))
+            area = path(frame.box(-np.inf, np.inf, mark.lower, mark.upper), fill(colour, OPACITIES[HBand]))
+            return area, path(edges, stroke(colour, THIN_WIDTH))  # in front of marks, which would hide a narrow band
+        case VSpan():
+            return path(frame.box(mark.start, mark.end, -np.inf, np.inf), fill(colour, OPACITIES[VSpan])), ""
+        case Reference():
+            x = np.array([frame.x.low, frame.x.high])
+            return "", path(frame.outline(x, mark.intercept + mark.slope * x), stroke(colour, style=mark.style))
+        case Tiles():
+            return "", draw_tiles(mark, frame)
     raise TypeError(f"{type(mark).__name__} cannot be drawn")
 
 
-def _stroke(mark: Any, order: float) -> dict[str, Any]:
-    """The looks of a mark that is a line."""
-    style, label = DASHES[mark.style], escape_label(mark.label)
-    return {"color": COLOURS[mark.colour], "linewidth": BAR_WIDTH, "linestyle": style, "label": label, "zorder": order}
+def draw_points(mark: Points, frame: Frame) -> str:
+    """Symbols with error bars and names."""
+    colour, x, y = COLOURS[mark.colour], frame.place_x(mark.x), frame.place_y(mark.y)
+    svg = (
+        ""
+        if mark.y_std is None
+        else error_bars(x, frame.place_y(mark.y - mark.y_std), frame.place_y(mark.y + mark.y_std), colour)
+    )
+    svg += path(symbols(x, y), dots(colour))
+    for a, b, above, name in zip(x.tolist(), y.tolist(), (mark.y >= 0).tolist(), mark.names, strict=False):
+        svg += words(a, b - 4 if above else b + 4 + 0.8 * SMALL_SIZE, name, colour, SMALL_SIZE, "middle")
+    return svg
 
 
-def _fill(mark: Any, alpha: float, order: float) -> dict[str, Any]:
-    """The looks of a mark that is an area."""
-    label = escape_label(mark.label)
-    return {"color": COLOURS[mark.colour], "alpha": alpha, "linewidth": 0, "label": label, "zorder": order}
+def error_bars(x: Array, low: Array, high: Array, colour: str) -> str:
+    """Vertical bars with ends."""
+    gap = np.full_like(x, np.nan)
+    columns = [(x, low), (x, high), (gap, gap)]
+    columns += [place for y in (low, high) for place in ((x - BAR_END, y), (x + BAR_END, y), (gap, gap))]
+    xs, ys = (np.stack(side, axis=1).ravel() for side in zip(*columns, strict=True))
+    return path(trace(xs, ys), stroke(colour))
 
 
-@draw_mark.register(Line)
-def _(mark: Line, axes: "Axes", order: float) -> None:
-    axes.plot(mark.x, mark.y, **_stroke(mark, order))
-
-
-@draw_mark.register(Points)
-def _(mark: Points, axes: "Axes", order: float) -> None:
-    colour = COLOURS[mark.colour]
-    axes.errorbar(
-        mark.x, mark.y, mark.y_std, fmt="o", markersize=2.6, markeredgewidth=0, color=colour, elinewidth=BAR_WIDTH,
-        capsize=2, label=escape_label(mark.label), zorder=order,
-    )  # fmt: skip
-    for x, y, name in zip(mark.x, mark.y, mark.names, strict=False):
-        axes.annotate(
-            name, (x, y), (0, 4 if y >= 0 else -4), textcoords="offset points", ha="center",
-            va="bottom" if y >= 0 else "top", fontsize=8, color=colour, parse_math=False, zorder=order + 1,
-        )  # fmt: skip
-
-
-@draw_mark.register(Band)
-def _(mark: Band, axes: "Axes", order: float) -> None:
-    axes.fill_between(mark.x, mark.lower, mark.upper, **_fill(mark, 0.25, 1.5))
-
-
-@draw_mark.register(Stems)
-def _(mark: Stems, axes: "Axes", order: float) -> None:
+def draw_stems(mark: Stems, frame: Frame) -> str:
+    """Stems from zero, with heads unless there are many."""
     colour, many = COLOURS[mark.colour], len(mark.x) > MANY
-    axes.vlines(
-        mark.x, 0.0, mark.y, color=colour, linewidth=0.5 if many else BAR_WIDTH, label=escape_label(mark.label),
-        zorder=order,
-    )  # fmt: skip
-    if not many:
-        axes.plot(mark.x, mark.y, "o", color=colour, markersize=2.2, markeredgewidth=0, zorder=order)
-    axes.axhline(0.0, color=SURROUNDINGS["axes"][0], linewidth=0.6, zorder=1)
+    x, zero = frame.place_x(mark.x), frame.place_y(np.zeros(len(mark.x)))
+    y, gap = frame.place_y(mark.y), np.full(len(mark.x), np.nan)
+    xs, ys = np.stack([x, x, gap], axis=1).ravel(), np.stack([zero, y, gap], axis=1).ravel()
+    heads = "" if many else path(symbols(x, y), dots(colour, 2.2))
+    base = path(frame.outline([frame.x.low, frame.x.high], [0.0, 0.0]), stroke(AXES, 0.6))
+    return base + path(trace(xs, ys), stroke(colour, THIN_WIDTH if many else LINE_WIDTH)) + heads
 
 
-@draw_mark.register(Histogram)
-def _(mark: Histogram, axes: "Axes", order: float) -> None:
-    axes.stairs(
-        mark.counts, mark.edges, fill=True, facecolor=COLOURS[mark.colour], edgecolor="white", linewidth=0, alpha=0.75,
-        label=escape_label(mark.label), zorder=order,
-    )  # fmt: skip
-
-
-@draw_mark.register(HLine)
-def _(mark: HLine, axes: "Axes", order: float) -> None:
-    axes.axhline(mark.y, **_stroke(mark, order))
-
-
-@draw_mark.register(VLine)
-def _(mark: VLine, axes: "Axes", order: float) -> None:
-    axes.axvline(mark.x, **_stroke(mark, order))
-
-
-@draw_mark.register(HBand)
-def _(mark: HBand, axes: "Axes", order: float) -> None:
-    axes.axhspan(mark.lower, mark.upper, **_fill(mark, 0.22, 1.2))
-    for edge in (mark.lower, mark.upper):  # above the marks, which would hide a narrow band
-        axes.axhline(edge, color=COLOURS[mark.colour], linewidth=0.5, zorder=3)
-
-
-@draw_mark.register(VSpan)
-def _(mark: VSpan, axes: "Axes", order: float) -> None:
-    axes.axvspan(mark.start, mark.end, **_fill(mark, 0.18, 1.1))
-
-
-@draw_mark.register(Reference)
-def _(mark: Reference, axes: "Axes", order: float) -> None:
-    axes.axline((0.0, mark.intercept), slope=mark.slope, **_stroke(mark, order))
-
-
-@draw_mark.register(Tiles)
-def _(mark: Tiles, axes: "Axes", order: float) -> None:
-    n = len(mark.names)
-    for k, value in enumerate(mark.value.tolist()):
-        row, column = divmod(k, n)
-        colour = COLOURS[mark.colour if value >= 0 else mark.opposite]
-        corners = [column - 0.48, column + 0.48], [row - 0.48] * 2, [row + 0.48] * 2
-        axes.fill_between(*corners, color=colour, alpha=0.6 * min(abs(value), 1.0), linewidth=0, zorder=order)
-        axes.text(
-            column, row, f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS), ha="center", va="center", zorder=order + 1
-        )
-    axes.set_xticks(range(n), [name.partition(" ")[0] for name in mark.names], parse_math=False)
-    axes.set_yticks(range(n), mark.names, parse_math=False)
-    axes.set(xlim=(-0.5, n - 0.5), ylim=(n - 0.5, -0.5))
-    axes.grid(visible=False)
-
-
-def draw_bars(bars: Sequence[Bars], axes: "Axes") -> None:
-    """Draw the Bars of a panel side by side over their shared names."""
-    width = 0.8 / max(len(bars), 1)
+def draw_bars(bars: Sequence[Bars], frame: Frame) -> str:
+    """The Bars of a panel side by side over their shared names."""
+    svg, width = "", BARS_WIDTH / max(len(bars), 1)
     for i, mark in enumerate(bars):
-        middle = np.arange(len(mark.names)) + (i - (len(bars) - 1) / 2) * width
-        axes.bar(
-            middle, mark.heights, 0.92 * width, yerr=mark.std, color=COLOURS[mark.colour],
-            label=escape_label(mark.label),
-            error_kw={"elinewidth": 0.9, "capsize": 2, "ecolor": SURROUNDINGS["words"][0]},
-        )  # fmt: skip
-    if bars:
-        axes.set_xticks(range(len(bars[0].names)), bars[0].names, parse_math=False)
-        axes.grid(visible=False, axis="x")
+        middle = np.arange(len(mark.names), dtype=np.float64) + (i - (len(bars) - 1) / 2) * width
+        half = BAR_SHARE * width / 2
+        boxes = (
+            frame.box(x - half, x + half, 0.0, y) for x, y in zip(middle.tolist(), mark.heights.tolist(), strict=True)
+        )
+        svg += path("".join(boxes), fill(COLOURS[mark.colour], 1.0))
+        if mark.std is not None:
+            ends = frame.place_y(mark.heights - mark.std), frame.place_y(mark.heights + mark.std)
+            svg += error_bars(frame.place_x(middle), *ends, WORDS)
+    return svg
 
 
-@singledispatch
-def draw_mark_3d(mark: Any, axes: "Axes3D") -> None:
-    """Draw one mark in space."""
-    raise TypeError(f"{type(mark).__name__} cannot be drawn in space")
+def draw_tiles(mark: Tiles, frame: Frame) -> str:
+    """Tinted tiles with their numbers."""
+    svg = ""
+    for k, value in enumerate(mark.value.tolist()):
+        row, column = divmod(k, len(mark.names))
+        colour, half = COLOURS[mark.colour if value >= 0 else mark.opposite], TILE / 2
+        box = frame.box(column - half, column + half, row - half, row + half)
+        x, y = float(frame.place_x([column])[0]), float(frame.place_y([row])[0])
+        number = f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS)
+        svg += path(box, fill(colour, 0.6 * min(abs(value), 1.0))) + words(x, y + 3, number, WORDS, anchor="middle")
+    return svg
 
 
-@draw_mark_3d.register(Line3D)
-def _(mark: Line3D, axes: "Axes3D") -> None:
-    axes.plot(
-        mark.x, mark.y, mark.z, color=COLOURS[mark.colour], linewidth=1.4, linestyle=DASHES[mark.style],
-        label=escape_label(mark.label),
-    )  # fmt: skip
-
-
-@draw_mark_3d.register(Points3D)
-def _(mark: Points3D, axes: "Axes3D") -> None:
-    axes.plot(mark.x, mark.y, mark.z, "o", color=COLOURS[mark.colour], markersize=4, label=escape_label(mark.label))
-    for x, y, z, name in zip(mark.x, mark.y, mark.z, mark.names, strict=False):
-        axes.text(x, y, z, f"  {name}", fontsize=8.5, parse_math=False)
+def draw_sample(mark: AnyMark | Line3D | Points3D, x: float, y: float, width: float) -> str:
+    """The sample of a mark before its legend entry, in the middle of a line [pt]."""
+    colour, ends = COLOURS[mark.colour], np.array([x, x + width])
+    if isinstance(mark, Points | Points3D):
+        return path(symbols(np.array([x + width / 2]), np.array([y])), dots(colour))
+    if isinstance(mark, Band | HBand | VSpan | Histogram | Bars):
+        box = trace(ends[[0, 1, 1, 0]], y + np.array([-3.0, -3.0, 3.0, 3.0]), closed=True)
+        return path(box, fill(colour, OPACITIES.get(type(mark), 1.0)))
+    return path(trace(ends, np.array([y, y])), stroke(colour, style=getattr(mark, "style", "solid")))

@@ -37,6 +37,7 @@ SURROUNDINGS: dict[str, tuple[str, str]] = {  # on a light page, on a dark one
     "grid": ("#e4e4e4", "#2c343d"),
     "paper": ("#ffffff", "#14181d"),
 }
+WORDS, AXES, GRID = (SURROUNDINGS[part][0] for part in ("words", "axes", "grid"))  # before a page turns dark
 TURN = ("blue", "vermillion", "green", "purple", "orange", "sky", "black")
 STYLES = ("solid", "dashed", "dotted", "dashdot")
 

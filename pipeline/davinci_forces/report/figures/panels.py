@@ -1,37 +1,59 @@
-"""Draw one panel with matplotlib: its marks, its axes, and its title and legend above the axes."""
+"""Lay out the panels of a figure: all axes of one size, aligned, with room for the widest words."""
 
 import textwrap
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
-from davinci_forces.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems, Tiles
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.report.content import Figure
+from davinci_forces.report.content.marks import (
+    AnyMark,
+    Band,
+    Bars,
+    HBand,
+    Histogram,
+    HLine,
+    Line,
+    Line3D,
+    Panel,
+    Points,
+    Points3D,
+    Stems,
+    Tiles,
+    VLine,
+    VSpan,
+)
 from davinci_forces.report.content.thinning import is_sorted, thin_mark
-from davinci_forces.report.figures.draw import draw_bars, draw_mark, unescape_label
 from davinci_forces.report.figures.palette import assign_looks
-from davinci_forces.report.figures.ticks import scale_ticks, set_log_ticks
+from davinci_forces.report.figures.ticks import Axis, axis_over
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
-VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = (
-    8,
-    30,
-    3,
-)  # of one mark in a millimetre: finer than its lines and symbols are wide
+PAGE_WIDTH = 170.0  # [mm] of the text on an A4 page
+# Of one mark in a millimetre: finer than its lines and symbols are wide.
+VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = 6, 30, 3
 LETTER_WIDTH = 1.65  # [mm] width of a character of a label
 LINE_HEIGHT = 3.9  # [mm] height of a line of a label or a row of a legend
-SAMPLE = 10.0  # [mm] width of the sample before a legend entry, with the gaps around it
-
+SAMPLE = 12.0  # [mm] width of the sample before a legend entry, with the gaps around it
 NAME = 3.6  # [mm] height of a point's name above or below the point
 ABOUT = 18.0  # [mm] of a panel's height for the words above and below the axes
+DIGIT = 1.8  # [mm] width of a character of the numbers on an axis
+TICK = 2.6  # [mm] from an axis to its numbers, and from the numbers to the label
+RIGHT = 4.0  # [mm] right of the axes, room for half of the last number
+NUMBERS = 3.4  # [mm] height of a line of numbers on an axis
+ROW_ABOVE = 2 * LINE_HEIGHT + 1.5  # [mm] height of a heading with one line of title and one line of legend
+MIN_AXES_HEIGHT = 15.0  # [mm]
+X_MARGIN, SYMBOL_MARGIN, Y_MARGIN = 0.01, 0.03, 0.05  # shares of a range beyond its marks
+NARROW, X_STEPS, FEW_X_STEPS, Y_STEPS = 70.0, 8, 4, 5  # [mm] a narrow panel; largest numbers of steps between ticks
 
 
 @dataclass(frozen=True)
 class Heading:
     """What stands above a panel: its title in lines, and the labels and entries of its legend, so many side by side.
 
-    A legend of one row stands `beside` the title if both fit.
+    A legend of one row stands `beside` the title if both fit.  One that holds for all panels of a row goes `across`
+    them, above their titles.
     """
 
     title: str
@@ -39,63 +61,167 @@ class Heading:
     entries: tuple[str, ...]
     columns: int
     beside: bool
+    across: bool = False
 
     @property
     def height(self) -> float:
         """Height of the whole heading [mm]."""
         # Entries that stand side by side have one line each.
-        rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(_lines, self.entries))
-        lines = rows * (not self.beside) + (_lines(self.title) if self.title else 0)
+        rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(lines_of, self.entries))
+        lines = rows * (not self.beside) + (lines_of(self.title) if self.title else 0)
         return LINE_HEIGHT * lines + 1.5
 
 
-def plan_heading(panel: Panel, room: float) -> Heading:
-    """The heading of a panel whose axes are this wide [mm]."""
-    labels = tuple(mark.label for mark in panel.marks if mark.label)
+@dataclass(frozen=True)
+class PlacedPanel:
+    """A panel with its marks as they are drawn, its axes, and their place on the page [mm], from the top left."""
+
+    title: str
+    marks: tuple[AnyMark, ...]
+    x: Axis
+    y: Axis
+    heading: Heading
+    y_numbers: float = 0.0  # width of the numbers left of the axes
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+
+    @property
+    def room_below(self) -> float:
+        """Height of the numbers and the label below the axes [mm]."""
+        return TICK + self.x.lines * NUMBERS + lines_of(self.x.label) * LINE_HEIGHT * bool(self.x.label) + 0.5
+
+
+def plan_heading(title: str, marks: Sequence[AnyMark | Line3D | Points3D], room: float) -> Heading:
+    """The heading of axes of this width [mm]."""
+    labels = tuple(mark.label for mark in marks if mark.label)
     longest = max(map(len, labels), default=0)
     columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER_WIDTH * longest))))
     entries = tuple(_wrap(label, room - SAMPLE) for label in labels)
-    title = _wrap(panel.title, 0.9 * room)  # bold letters are wider
+    title = _wrap(title, 0.9 * room)  # bold letters are wider
     row = sum(SAMPLE + LETTER_WIDTH * len(label) for label in labels) + 3
     beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER_WIDTH * len(title) + row <= room
     return Heading(title, labels, entries, columns, beside)
 
 
-def _lines(text: str) -> int:
+def lines_of(text: str) -> int:
+    """Lines of a text."""
     return text.count("\n") + 1
 
 
-def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label: bool) -> None:
-    """Draw a panel into a cell of this width and height [mm], without what stands above it."""
-    _draw_marks(axes, panel, width)
-    if panel.x_range:
-        axes.set_xlim(*panel.x_range)
+def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
+    """The panels of a figure in their places, and the height of the figure [mm].
+
+    The height that a figure asks for includes its words, with two lines of heading.
+    """
+    columns, width = figure.columns, PAGE_WIDTH / figure.columns
+    panels = [_with_axes(figure, place, width) for place in range(len(figure.panels))]
+    numbers = max(panel.y.letters for panel in panels) * DIGIT
+    left = TICK + numbers + max(lines_of(panel.y.label) for panel in panels) * LINE_HEIGHT + 1
+    wide = width - left - RIGHT
+    panels = [_fitted(panel, width, wide) for panel in panels]
+    rows = [_sharing_legend(panels[i : i + columns], left) for i in range(0, len(panels), columns)]
+    above = [max(panel.heading.height for panel in row) for row in rows]
+    below = [max(panel.room_below for panel in row) for row in rows]
+    asked = figure.height * len(rows) + sum(max(room - ROW_ABOVE, 0) for room in above)
+    high = max((asked - sum(above) - sum(below)) / len(rows), MIN_AXES_HEIGHT)
+    placed, top = list[PlacedPanel](), 0.0
+    for row, over, under in zip(rows, above, below, strict=True):
+        top += over
+        for j, panel in enumerate(row):
+            placed.append(replace(panel, y_numbers=numbers, left=j * width + left, top=top, width=wide, height=high))
+        top += high + under
+    return tuple(placed), top
+
+
+def _sharing_legend(row: list[PlacedPanel], left: float) -> list[PlacedPanel]:
+    """The panels of a row; if the first one alone has a legend, that goes across all."""
+    first, *others = row
+    if not others or not first.heading.labels or any(panel.heading.labels for panel in others):
+        return row
+    legend = plan_heading("", first.marks, PAGE_WIDTH - left)
+    return [replace(first, heading=replace(legend, title=first.heading.title, across=True)), *others]
+
+
+def _with_axes(figure: Figure, place: int, width: float) -> PlacedPanel:
+    """A panel with the ranges of its axes, and the numbers on the vertical one."""
+    panel = figure.panels[place]
+    marks = tuple(thin_mark(mark, max_points(mark, width)) for mark in assign_looks(panel.marks))
+    sharing = figure.panels if figure.zoomable else (panel,)
+    is_last = place + figure.columns >= len(figure.panels)
+    label = panel.x_label if is_last or not figure.zoomable else ""
+    x, y = _across(sharing, label), _up(panel, figure.height)
+    names = next((mark.names for mark in marks if isinstance(mark, Bars | Tiles)), ())
+    if any(isinstance(mark, Tiles) for mark in marks):
+        n = len(names)
+        x = replace(x, low=-0.5, high=n - 0.5).with_names([name.partition(" ")[0] for name in names])
+        y = Axis(n - 0.5, -0.5, log=False, label=panel.y_label).with_names(names)
+    elif names:
+        x = x.with_names(names)
+    return PlacedPanel(panel.title, marks, x, y, plan_heading(panel.title, marks, width))
+
+
+def _across(panels: Sequence[Panel], label: str) -> Axis:
+    """The horizontal axis that panels share."""
+    marks = [mark for panel in panels for mark in panel.marks]
+    margin = SYMBOL_MARGIN if any(isinstance(mark, Points | Stems) for mark in marks) else X_MARGIN
+    stated = [panel.x_range for panel in panels if panel.x_range]
+    columns = list(map(np.array, stated)) or [x for mark in marks for x in _extent(mark)[0]]
+    return axis_over(columns, (0.0, 0.0) if stated else (margin, margin), panels[0].x_log, label)
+
+
+def _up(panel: Panel, height: float) -> Axis:
+    """The vertical axis, with room for the names of points, and with its numbers."""
+    label = wrap_label(panel.y_label, height - ABOUT)
     if panel.y_range:
-        axes.set_ylim(*panel.y_range)
-    tiles = any(isinstance(mark, Tiles) for mark in panel.marks)
-    named = tiles or any(isinstance(mark, Bars) for mark in panel.marks)
-    across = panel.x_label if named else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
-    up = panel.y_label if tiles else _ticks(axes, "y", panel.y_log, panel.y_label, 5)
-    axes.set_xlabel(wrap_label(across, width - 18) if x_label else "", parse_math=False)
-    axes.set_ylabel(wrap_label(up, height - ABOUT), parse_math=False)
+        return axis_over([np.array(panel.y_range)], (0.0, 0.0), panel.y_log, label).with_numbers(Y_STEPS)
+    columns = [y for mark in panel.marks for y in _extent(mark)[1]]
+    names = any(isinstance(mark, Points) and mark.names for mark in panel.marks)
+    room = height - ROW_ABOVE - ABOUT / 2
+    margin = Y_MARGIN + (NAME / max(room - 2 * NAME, NAME) if names else 0.0)
+    stands = any(isinstance(mark, Bars | Histogram) for mark in panel.marks) and all(_least(y) >= 0 for y in columns)
+    axis = axis_over(columns, (0.0 if stands else margin, margin), panel.y_log, label).with_numbers(Y_STEPS)
+    return replace(axis, label=wrap_label(" ".join(axis.label.split()), height - ABOUT))
 
 
-def _draw_marks(axes: "Axes", panel: Panel, width: float) -> None:
-    marks = list(assign_looks(panel.marks))
-    draw_bars([mark for mark in marks if isinstance(mark, Bars)], axes)
-    for order, mark in enumerate(marks):
-        if not isinstance(mark, Bars):
-            draw_mark(thin_mark(mark, max_points(mark, width)), axes, 2 + 0.01 * order)
-    if any(isinstance(mark, Points | Stems) for mark in panel.marks):
-        axes.margins(x=0.03)  # room for symbols at the ends
+def _least(x: Array) -> float:
+    return float(np.nanmin(x, initial=0.0))
 
 
-def make_room_for_names(axes: "Axes", panel: Panel, height: float) -> None:
-    """Widen the range of y so that the names of points fit into axes of a height [mm]."""
-    if panel.y_range is None and any(isinstance(mark, Points) and mark.names for mark in panel.marks):
-        low, high = axes.get_ylim()
-        room = NAME / max(height - 2 * NAME, NAME) * (high - low)
-        axes.set_ylim(low - room, high + room)
+def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
+    """The values of x and of y that axes show of a mark."""
+    match mark:
+        case Points():
+            std = 0.0 if mark.y_std is None else mark.y_std
+            return [mark.x], [mark.y - std, mark.y + std]
+        case Band():
+            return [mark.x], [mark.lower, mark.upper]
+        case Stems():
+            return [mark.x], [mark.y, np.zeros(1)]
+        case Histogram():
+            return [mark.edges], [mark.counts, np.zeros(1)]
+        case Bars():
+            std = 0.0 if mark.std is None else mark.std
+            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights - std, mark.heights + std, np.zeros(1)]
+        case Line():
+            return [mark.x], [mark.y]
+        case HLine():
+            return [], [np.array([mark.y])]
+        case VLine():
+            return [np.array([mark.x])], []
+        case HBand():
+            return [], [np.array([mark.lower, mark.upper])]
+        case VSpan():
+            return [np.array([mark.start, mark.end])], []
+    return [], []
+
+
+def _fitted(panel: PlacedPanel, width: float, wide: float) -> PlacedPanel:
+    """A panel with the numbers and the label of its horizontal axis, and its heading, for axes of this width [mm]."""
+    x = panel.x if panel.x.values else panel.x.with_numbers(FEW_X_STEPS if width < NARROW else X_STEPS, wide / DIGIT)
+    x = replace(x, label=wrap_label(x.label, width - 18))
+    return replace(panel, x=x, heading=plan_heading(panel.title, panel.marks, wide))
 
 
 def max_points(mark: AnyMark, width: float) -> int:
@@ -103,17 +229,6 @@ def max_points(mark: AnyMark, width: float) -> int:
     if isinstance(mark, Points | Stems):
         return round(SYMBOLS_PER_MM * width)
     return round((VERTICES if not isinstance(mark, Line) or is_sorted(mark.x) else LOOP_VERTICES) * width)
-
-
-def _ticks(axes: "Axes", name: str, log: bool, label: str, max_ticks: int) -> str:
-    """Put readable ticks on one axis; return its label, with the power of ten that its numbers omit."""
-    axis = axes.xaxis if name == "x" else axes.yaxis
-    if log:
-        axes.set_xscale("log") if name == "x" else axes.set_yscale("log")
-        set_log_ticks(axis)
-        return label
-    axes.locator_params(nbins=max_ticks, axis="x" if name == "x" else "y")
-    return scale_ticks(axis, label)
 
 
 def wrap_label(label: str, room: float) -> str:
@@ -125,32 +240,5 @@ def wrap_label(label: str, room: float) -> str:
 
 
 def _wrap(text: str, room: float) -> str:
-    return textwrap.fill(text, max(int(room / LETTER_WIDTH), 1), break_long_words=False, break_on_hyphens=False)
-
-
-def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> None:
-    """Title at the top of `room` [mm] above axes of a height [mm], and the legend right above them or beside it."""
-    if heading.title:
-        axes.text(
-            0, 1 + (room - 0.5) / height, heading.title, transform=axes.transAxes, va="top", fontsize=9,
-            fontweight="bold", parse_math=False,
-        )  # fmt: skip
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        # In the order of the marks, which is not that of matplotlib's kinds of artists.
-        ranks = [heading.labels.index(unescape_label(label)) for label in labels]
-        handles = [handle for _, handle in sorted(zip(ranks, handles, strict=True), key=lambda pair: pair[0])]
-        anchor = (1.0, 1 + (room - LINE_HEIGHT - 1.0) / height) if heading.beside else (0.0, 1.0)
-        draw_legend(axes, handles, heading, anchor)
-
-
-def draw_legend(axes: "Axes", handles: list["Artist"], heading: Heading, anchor: tuple[float, float]) -> None:
-    """The legend above the axes, where it covers no data; its corner, left or right, at the anchor."""
-    place: Any = "lower right" if heading.beside else "lower left"
-    legend = axes.legend(
-        handles, [" "] * len(handles), loc=place, bbox_to_anchor=anchor, ncols=heading.columns, frameon=False,
-        borderpad=0, borderaxespad=0.25, handlelength=2.6, columnspacing=1.4, labelspacing=0.3, handletextpad=0.5,
-    )  # fmt: skip
-    # Set afterwards: matplotlib leaves out a label that begins with an underscore, and reads dollars as maths.
-    for text, entry in zip(legend.get_texts(), heading.entries, strict=True):
-        text.set(text=entry, parse_math=False)
+    options: Any = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.fill(text, max(int(room / LETTER_WIDTH), 1), **options)

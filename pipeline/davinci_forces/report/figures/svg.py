@@ -1,54 +1,30 @@
-"""Draw figures as SVG with matplotlib: the same bytes for the same figure, no date, and words as text."""
+"""Draw figures as SVG: the same bytes for the same figure, no date, and words as text."""
 
-import io
-import re
-from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
 from davinci_forces.report.content import Figure, Figure3D
-from davinci_forces.report.content.marks import Panel
-from davinci_forces.report.figures.draw import draw_mark_3d
-from davinci_forces.report.figures.grid import INCH, PAGE_WIDTH, arrange
-from davinci_forces.report.figures.palette import SURROUNDINGS, assign_looks
-from davinci_forces.report.figures.panels import draw_heading, draw_panel, plan_heading
+from davinci_forces.report.content.marks import AnyMark, Bars, Line3D, Points3D, Tiles
+from davinci_forces.report.figures.draw import Frame, draw_bars, draw_mark, draw_sample, stroke
+from davinci_forces.report.figures.palette import AXES, GRID, WORDS, assign_looks
+from davinci_forces.report.figures.panels import (
+    LETTER_WIDTH,
+    LINE_HEIGHT,
+    NUMBERS,
+    PAGE_WIDTH,
+    SAMPLE,
+    TICK,
+    Heading,
+    PlacedPanel,
+    place_panels,
+    plan_heading,
+)
+from davinci_forces.report.figures.shapes import NORMAL_SIZE, POINT, SMALL_SIZE, TITLE_SIZE, path, words
+from davinci_forces.report.figures.space import draw_space
+from davinci_forces.report.figures.ticks import Axis
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
-
-WORDS, AXES, GRID = (SURROUNDINGS[part][0] for part in ("words", "axes", "grid"))
-STYLE: Any = {
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.edgecolor": AXES,
-    "axes.grid": True,
-    "axes.labelcolor": WORDS,
-    "axes.labelsize": 8.5,
-    "axes.linewidth": 0.6,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.unicode_minus": True,
-    "axes.xmargin": 0.01,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "font.family": ["DejaVu Sans"],
-    "font.size": 8.5,
-    "grid.color": GRID,
-    "grid.linewidth": 0.5,
-    "legend.fontsize": 8.5,
-    "svg.fonttype": "none",  # words stay text, which each writer sets in its own font
-    "svg.hashsalt": "davinci-forces",
-    "text.color": WORDS,
-    "xtick.color": AXES,
-    "xtick.labelcolor": WORDS,
-    "xtick.labelsize": 8,
-    "ytick.color": AXES,
-    "ytick.labelcolor": WORDS,
-    "ytick.labelsize": 8,
-}
-LONG = 400  # characters; a longer path is written in relative steps
+TICK_LENGTH = 3.0  # [pt]
+DRAWN_SAMPLE = 7.5  # [mm] length of the sample before a legend entry
+BASELINE = 0.35  # of the size of words: from their middle down to the line that they stand on
 drawn: "WeakKeyDictionary[Figure | Figure3D, str]" = WeakKeyDictionary()
 
 
@@ -61,99 +37,106 @@ def svg(figure: Figure | Figure3D) -> str:
 
 def draw_svg(figure: Figure | Figure3D) -> str:
     """Draw the figure as an SVG element, without the cache of `svg`."""
-    import matplotlib as mpl
-
-    with mpl.rc_context(STYLE):
-        file = io.StringIO()
-        metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
-        draw_figure(figure).savefig(file, format="svg", metadata=metadata)
-    text = file.getvalue()
-    return _round_coordinates(text[text.index("<svg") :])
-
-
-def _round_coordinates(text: str) -> str:
-    """Round coordinates to a hundredth of a point, in long paths to a tenth: invisible, and a fifth of the size."""
-    text = re.sub(r'(?<= [xy]=")-?\d+\.\d{3,}', lambda n: f"{float(n[0]):.2f}", text)
-    return re.sub(r' d="[^"]*"', lambda path: _round_path(path[0]), text)
-
-
-def _round_path(path: str) -> str:
-    if len(path) > LONG and not re.search(r"[A-KN-Za-z]", path[4:-1]):
-        return f' d="{_steps(path)}"'
-    path = re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.2f}", path)
-    return re.sub(r"\s*([A-Za-z])\s+", r"\1", path)
-
-
-def _steps(path: str) -> str:
-    """A path of straight lines as steps in tenths of a point: half the characters of absolute coordinates."""
-    parts: list[str] = []
-    here = (0, 0)
-    for letter, x, y in re.findall(r"([ML])\s*(-?[\d.]+) (-?[\d.]+)", path):
-        there = (round(10 * float(x)), round(10 * float(y)))
-        if letter == "M":
-            parts.append(f"M{there[0] / 10:g} {there[1] / 10:g}l")
-        elif there != here:
-            parts.append(f"{_tenths(there[0] - here[0])}{_tenths(there[1] - here[1])}")
-        here = there
-    return re.sub(r"l(?=M|$)|(?<=l) ", "", "".join(parts))
-
-
-def _tenths(number: int) -> str:
-    """A number of tenths as text after another number: ` 1.2`, ` .3`, `-4`."""
-    text = f"{number / 10:g}".replace("0.", ".", 1) if abs(number) < 10 else f"{number / 10:g}"
-    return text if text.startswith("-") else f" {text}"
-
-
-def draw_figure(figure: Figure | Figure3D) -> "Canvas":
-    """A figure on a canvas of the page's width."""
     if isinstance(figure, Figure3D):
-        return _draw_space(figure)
-    canvas = _canvas(figure.height)
-    width = PAGE_WIDTH / figure.columns
-    shared: Axes | None = None
-    for place, panel in enumerate(figure.panels):
-        axes = canvas.add_axes((0, 0, 1, 1), sharex=shared, label=str(place))
-        shared = axes if figure.zoomable else None
-        last = place + figure.columns >= len(figure.panels)
-        draw_panel(axes, panel, width, figure.height, x_label=last or not figure.zoomable)
-    arrange(canvas, figure)
-    return canvas
+        marks = tuple(assign_looks(figure.marks))
+        heading, height = plan_heading("", marks, PAGE_WIDTH), figure.height
+        content = draw_space(figure, marks, PAGE_WIDTH, heading.height)
+        content += draw_heading(heading, marks, 0.0, heading.height, PAGE_WIDTH)
+    else:
+        panels, height = place_panels(figure)
+        content = "".join(draw_panel(panel, f"p{i}") for i, panel in enumerate(panels))
+    size = f"{PAGE_WIDTH * POINT:.6f}", f"{height * POINT:.6f}"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}pt" height="{size[1]}pt" '
+        f'viewBox="0 0 {size[0]} {size[1]}">{content}</svg>'
+    )
 
 
-def _canvas(height: float) -> "Canvas":
-    """An empty canvas of the page's width, made without pyplot and its global state."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure as Canvas
-
-    canvas = Canvas(figsize=(PAGE_WIDTH / INCH, height / INCH), dpi=72)
-    FigureCanvasSVG(canvas)  # words are laid out by their sizes in SVG, not in pixels
-    return canvas
-
-
-def _draw_space(figure: Figure3D) -> "Canvas":
-    canvas = _canvas(figure.height)
-    legend = plan_heading(Panel("", "", "", figure.marks), PAGE_WIDTH)  # type: ignore[arg-type]
-    height = figure.height - legend.height
-    axes: Any = canvas.add_axes((0, 0, 1, height / figure.height), projection="3d")
-    for mark in assign_looks(figure.marks):
-        draw_mark_3d(mark, axes)
-    _set_equal_ranges(axes, figure)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))  # the page's own colour, dark or light
-    axes.set_xlabel(figure.x_label)
-    axes.set_ylabel(figure.y_label)
-    axes.set_zlabel(figure.z_label)
-    axes.view_init(elev=figure.elevation, azim=figure.azimuth)
-    draw_heading(axes, legend, legend.height, height)
-    return canvas
+def draw_panel(panel: PlacedPanel, name: str) -> str:
+    """A panel: grid, marks, axes with numbers and labels, heading."""
+    place = (POINT * side for side in (panel.left, panel.top, panel.width, panel.height))
+    frame = Frame(panel.x, panel.y, *place)
+    bars = [mark for mark in panel.marks if isinstance(mark, Bars)]
+    drawn_marks = [draw_mark(mark, frame) for mark in panel.marks if not isinstance(mark, Bars)]
+    marks = draw_bars(bars, frame) + "".join(behind for behind, _ in drawn_marks)
+    marks += "".join(before for _, before in drawn_marks)
+    box = f'<rect x="{frame.left:.2f}" y="{frame.top:.2f}" width="{frame.width:.2f}" height="{frame.height:.2f}"/>'
+    clip = f'<defs><clipPath id="{name}">{box}</clipPath></defs>'
+    return (
+        f'{clip}{draw_grid(panel, frame)}<g clip-path="url(#{name})">{marks}</g>{draw_axes(panel, frame)}'
+        f"{draw_heading(panel.heading, panel.marks, panel.left, panel.top, panel.width)}"
+    )
 
 
-def _set_equal_ranges(axes: Any, figure: Figure3D) -> None:
-    """Ranges of one length about the middle of the marks, so that angles in space are true."""
-    points = np.hstack([[mark.x, mark.y, mark.z] for mark in figure.marks])
-    least, greatest = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
-    half = 0.55 * max(float(np.max(greatest - least)), 1e-9)
-    for axis, middle in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), (least + greatest) / 2, strict=True):
-        axis(middle - half, middle + half)
-    axes.set_box_aspect((1, 1, 1), zoom=0.9)
-    axes.locator_params(nbins=5)
+def numbers_within(axis: Axis) -> list[tuple[float, str]]:
+    """The numbers of an axis, with their places as shares of its length."""
+    shares = axis.share(axis.values).tolist()
+    return [(share, number) for share, number in zip(shares, axis.numbers, strict=True) if -1e-9 <= share <= 1 + 1e-9]
+
+
+def draw_grid(panel: PlacedPanel, frame: Frame) -> str:
+    """Lines at the numbers; none at names."""
+    right, bottom = frame.left + frame.width, frame.top + frame.height
+    if any(isinstance(mark, Tiles) for mark in panel.marks):
+        return ""
+    named = any(isinstance(mark, Bars) for mark in panel.marks)
+    across = () if named else (frame.left + share * frame.width for share, _ in numbers_within(panel.x))
+    up = (bottom - share * frame.height for share, _ in numbers_within(panel.y))
+    d = "".join(f"M{x:.2f} {frame.top:.2f}V{bottom:.2f}" for x in across)
+    return path(d + "".join(f"M{frame.left:.2f} {y:.2f}H{right:.2f}" for y in up), stroke(GRID, 0.5))
+
+
+def draw_axes(panel: PlacedPanel, frame: Frame) -> str:
+    """The left and the lower edge, with ticks, numbers and labels."""
+    bottom, middle = frame.top + frame.height, frame.left + frame.width / 2
+    d = f"M{frame.left:.2f} {frame.top:.2f}V{bottom:.2f}H{frame.left + frame.width:.2f}"
+    text = ""
+    for share, number in numbers_within(panel.x):
+        x = frame.left + share * frame.width
+        d += f"M{x:.2f} {bottom:.2f}v{TICK_LENGTH:g}"
+        text += lines(x, bottom + (TICK + NUMBERS / 2) * POINT, number, WORDS, SMALL_SIZE, NUMBERS)
+    for share, number in numbers_within(panel.y):
+        y = bottom - share * frame.height
+        d += f"M{frame.left:.2f} {y:.2f}h-{TICK_LENGTH:g}"
+        text += words(frame.left - TICK_LENGTH - 3, y + BASELINE * SMALL_SIZE, number, WORDS, SMALL_SIZE, "end")
+    below = bottom + (TICK + panel.x.lines * NUMBERS + LINE_HEIGHT / 2) * POINT
+    text += lines(middle, below, panel.x.label, WORDS, NORMAL_SIZE, LINE_HEIGHT)
+    labels = panel.y.label.split("\n")
+    for i, label in enumerate(reversed(labels)):
+        x = panel.left - TICK - panel.y_numbers - (i + 0.4) * LINE_HEIGHT
+        text += words(x * POINT, frame.top + frame.height / 2, label, WORDS, NORMAL_SIZE, "middle", turned=True)
+    return path(d, stroke(AXES, 0.6)) + text
+
+
+def lines(x: float, y: float, text: str, colour: str, size: float, height: float) -> str:
+    """Lines of words, `height` [mm] apart, whose first one has its middle at (x, y) [pt]."""
+    rows = enumerate(text.split("\n"))
+    return "".join(words(x, y + i * height * POINT + BASELINE * size, row, colour, size, "middle") for i, row in rows)
+
+
+def draw_heading(
+    heading: Heading, marks: tuple[AnyMark | Line3D | Points3D, ...], left: float, bottom: float, width: float
+) -> str:
+    """Title and legend above axes whose upper left corner is at (left, bottom) and which are `width` wide [mm]."""
+    top, titles = bottom - heading.height + LINE_HEIGHT / 2 + 0.5, heading.title.split("\n") if heading.title else []
+    shown = [mark for mark in marks if mark.label]
+    widths = [SAMPLE + LETTER_WIDTH * len(mark.label) for mark in shown]
+    x, y = left, top + LINE_HEIGHT * len(titles) * (not heading.across)
+    if heading.beside:
+        x, y = left + width - sum(widths), y - LINE_HEIGHT
+    svg, start = "", x
+    for k, (mark, entry) in enumerate(zip(shown, heading.entries, strict=True)):
+        svg += draw_sample(mark, x * POINT, y * POINT, DRAWN_SAMPLE * POINT)
+        rows = entry.split("\n")
+        for i, row in enumerate(rows):
+            below = (y + i * LINE_HEIGHT) * POINT + BASELINE * NORMAL_SIZE
+            svg += words((x + DRAWN_SAMPLE + 1.5) * POINT, below, row, WORDS, NORMAL_SIZE)
+        x += widths[k] if heading.beside else max(widths)
+        if not heading.beside and (k + 1) % heading.columns == 0:
+            x, y = start, y + LINE_HEIGHT * (len(rows) if heading.columns == 1 else 1)
+    top = bottom - 1.0 - LINE_HEIGHT * (len(titles) - 0.5) if heading.across else top
+    for i, row in enumerate(titles):
+        svg += words(
+            left * POINT, (top + i * LINE_HEIGHT) * POINT + BASELINE * TITLE_SIZE, row, WORDS, TITLE_SIZE, bold=True
+        )
+    return svg

@@ -1,15 +1,109 @@
-"""Short numbers on the axes of figures; the axis label states their common power of ten."""
+"""An axis: its range, round numbers along it, and their text; the axis label states their common power of ten."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content.number import MINUS, SUPERSCRIPTS
-
-if TYPE_CHECKING:
-    from matplotlib.axis import Axis
 
 FEW_DECADES = 3  # axes of fewer decades are also numbered at 2 and 5
 PLAIN_RANGE = (2e-3, 2e4)  # no power of ten is taken out if the largest magnitude is in this range
+ROUND_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # round steps between numbers
+ROUNDING = 1e-9  # of a step
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A range, logarithmic if `log`, with numbers at `values`; `label` has the power of ten that they omit."""
+
+    low: float
+    high: float
+    log: bool
+    label: str
+    values: tuple[float, ...] = ()
+    numbers: tuple[str, ...] = ()
+
+    def share(self, x: Array | Sequence[float]) -> Array:
+        """The place of each value along the axis: 0 at its lower end, 1 at its upper end."""
+        if not self.log:
+            return (np.asarray(x, float) - self.low) / (self.high - self.low)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.log10(np.asarray(x, float) / self.low) / math.log10(self.high / self.low)
+
+    def with_numbers(self, most: int, capacity: float = math.inf) -> "Axis":
+        """The axis with round numbers, at most `most` steps apart, so few that they do not touch.
+
+        `capacity` is the length of the axis in characters.
+        """
+        if self.log:
+            return self._with_decades()
+        exponent = power_of_ten(max(abs(self.low), abs(self.high)))
+        scale = 10.0**exponent
+        for intervals in range(most, 0, -1):
+            values, step = round_values(self.low / scale, self.high / scale, intervals)
+            numbers = in_digits(values, step)
+            widest = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
+            if len(values) < 3 or widest <= capacity * step * scale / (self.high - self.low):
+                break
+        places = tuple((values * scale).tolist())
+        return replace(self, label=with_power(self.label, exponent), values=places, numbers=numbers)
+
+    def _with_decades(self) -> "Axis":
+        """Numbers at 1, 2 and 5 of each decade, or at powers of ten on a long axis."""
+        low, high = math.log10(self.low), math.log10(self.high)
+        first, last = math.ceil(low), math.floor(high)
+        if last - first < FEW_DECADES:
+            values = [digit * 10.0**n for n in range(first - 1, last + 1) for digit in (1, 2, 5)]
+            inside = tuple(value for value in values if low <= math.log10(value) <= high)
+            return replace(self, values=inside, numbers=tuple(f"{value:g}" for value in inside))
+        powers = range(first, last + 1, math.ceil((last - first) / FEW_DECADES))
+        numbers = tuple(f"10{str(n).translate(SUPERSCRIPTS)}" for n in powers)
+        return replace(self, values=tuple(10.0**n for n in powers), numbers=numbers)
+
+    def with_names(self, names: Sequence[str]) -> "Axis":
+        """The axis with names at 0, 1, 2, ..."""
+        return replace(self, values=tuple(map(float, range(len(names)))), numbers=tuple(names))
+
+    @property
+    def letters(self) -> int:
+        """Characters of its longest number."""
+        return max((len(line) for number in self.numbers for line in number.split("\n")), default=0)
+
+    @property
+    def lines(self) -> int:
+        """Lines of its highest number."""
+        return max((number.count("\n") + 1 for number in self.numbers), default=1)
+
+
+def axis_over(columns: Iterable[Array], margins: tuple[float, float], log: bool, label: str) -> Axis:
+    """An axis over all finite values, and over `margins` as shares of their range below and above."""
+    values = np.concatenate([np.zeros(0), *columns])
+    values = values[np.isfinite(values) & ((values > 0) | (not log))]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (1.0, 10.0) if log else (0.0, 1.0)
+    if low == high:
+        low, high = (low / 2, 2 * high) if log else (low - (abs(low) or 1.0) / 20, high + (abs(high) or 1.0) / 20)
+    below, above = margins
+    if log:
+        return Axis(low * (low / high) ** below, high * (high / low) ** above, log, label)
+    return Axis(low - below * (high - low), high + above * (high - low), log, label)
+
+
+def round_values(low: float, high: float, intervals: int) -> tuple[Array, float]:
+    """Multiples of a round step from low to high, in at most so many intervals, and the step."""
+    least = (high - low) / intervals
+    base = 10.0 ** math.floor(math.log10(least))
+    step = next(base * factor for factor in ROUND_STEPS if base * factor >= least * (1 - ROUNDING))
+    first, last = math.ceil(low / step - ROUNDING), math.floor(high / step + ROUNDING)
+    return np.arange(first, last + 1, dtype=np.float64) * step, step
+
+
+def in_digits(values: Array, step: float) -> tuple[str, ...]:
+    """Numbers in as many decimals as their step needs."""
+    decimals = next((d for d in range(9) if abs(round(step, d) - step) < ROUNDING * step), 9)
+    return tuple(f"{value + 0.0:.{decimals}f}".replace("-", MINUS) for value in np.round(values, decimals).tolist())
 
 
 def power_of_ten(greatest: float) -> int:
@@ -19,48 +113,10 @@ def power_of_ten(greatest: float) -> int:
     return 3 * math.floor(math.log10(greatest) / 3)
 
 
-def scale_ticks(axis: "Axis", label: str) -> str:
-    """Divide the numbers on an axis by a power of ten that suits its range, and return the label with this power."""
-    from matplotlib.ticker import FuncFormatter
-
-    # By default, matplotlib writes the power at the end of the axis, where the legend is.
-    exponent = power_of_ten(float(max(abs(limit) for limit in axis.get_view_interval())))
+def with_power(label: str, exponent: int) -> str:
+    """An axis label with the power of ten that its numbers omit, before the unit."""
     if exponent == 0:
         return label
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:.6g}".replace("-", MINUS)))
     ten = f"10{str(exponent).translate(SUPERSCRIPTS)}"
     meaning, bracket, unit = label.rpartition("[")
     return f"{meaning}[{ten} {unit}" if bracket else f"{label} [{ten}]"
-
-
-def spread_ticks(axis: "Axis", capacity: float) -> None:
-    """Use fewer numbers on a linear axis, which is `capacity` characters long, until no two of them touch."""
-    from matplotlib.ticker import MaxNLocator
-
-    locator, (low, high) = axis.get_major_locator(), axis.get_view_interval()
-    while isinstance(locator, MaxNLocator):
-        values = [value for value in locator() if low <= value <= high]
-        numbers = axis.get_major_formatter().format_ticks(values)
-        characters = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
-        if len(values) < 3 or characters <= capacity * (values[1] - values[0]) / (high - low):
-            break
-        locator.set_params(nbins=len(values) - 2)
-
-
-def set_log_ticks(axis: "Axis") -> None:
-    """Number a logarithmic axis of a given range at 1, 2 and 5 of each decade, or at powers of ten if it is long."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
-
-    low, high = sorted(math.log10(limit) for limit in axis.get_view_interval())
-    first, last = math.ceil(low), math.floor(high)
-    if last - first < FEW_DECADES:
-        values = [digit * 10.0**n for n in range(first - 1, last + 1) for digit in (1, 2, 5)]
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    else:
-        values = [10.0**n for n in range(first, last + 1, math.ceil((last - first) / FEW_DECADES))]
-        axis.set_major_formatter(
-            FuncFormatter(lambda value, _: f"10{str(round(math.log10(value))).translate(SUPERSCRIPTS)}")
-        )
-    axis.set_major_locator(FixedLocator([value for value in values if low <= math.log10(value) <= high]))
-    axis.set_minor_locator(NullLocator())
-    axis.set_minor_formatter(NullFormatter())

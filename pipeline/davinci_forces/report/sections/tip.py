@@ -230,8 +230,8 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     ends = here + per_newton * largest
     marks = (
         line(path[few], "path of the tip", "grey"),
-        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky"),
-        line(strokes(here, ends), "where it is largest", "vermillion"),
+        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky", arrow=True),
+        line(strokes(here, ends), "where it is largest", "vermillion", arrow=True),
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(
             here[:, 0], here[:, 1], here[:, 2], "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))
@@ -265,9 +265,9 @@ def strokes(start: Column, end: Column) -> Column:
     return np.stack([start, end, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
 
 
-def line(points: Column, name: str, colour: Colour) -> Line3D:
+def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line3D:
     """A line through points (N, 3)."""
-    return Line3D(points[:, 0], points[:, 1], points[:, 2], name, colour, "solid")
+    return Line3D(points[:, 0], points[:, 1], points[:, 2], name, colour, "solid", arrow)
 
 
 def windows(contact: TipContact) -> list[tuple[float, float]]:

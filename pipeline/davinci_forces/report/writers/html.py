@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
-LARGEST = 4_700_000  # [bytes] of the whole file; the traces get the space that other content leaves
+LARGEST = 3_400_000  # [bytes] of the whole file; the traces get the space that other content leaves
 POINT_BYTES = 11  # per point of a trace: two numbers in single precision, in base 64
 MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # points of one zoomable figure
 STILL_POINTS = 2_000  # points of a figure that does not zoom, for saving its numbers

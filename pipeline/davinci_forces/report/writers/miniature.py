@@ -1,4 +1,4 @@
-"""Draw figures in few bytes, without matplotlib: a report of hundreds of runs has no room or time for more.
+"""Draw figures in few bytes: a report of hundreds of runs has no room or time for more.
 
 A figure has lines, bands, points, windows, a legend and the ends of the axes; other marks are left out.
 """

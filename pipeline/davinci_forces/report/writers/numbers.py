@@ -11,11 +11,14 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import Figure, Figure3D, Panel
 from davinci_forces.report.content.inline import printable
-from davinci_forces.report.content.thinning import points_of, thin_mark
+from davinci_forces.report.content.thinning import is_sorted, points_of, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
 
 Json = dict[str, Any]
 PIXELS = 96 / 25.4  # of CSS in a millimetre
+CODES = 2**16 - 2  # steps of a range that two bytes tell apart; one more code is for missing values
+FEW_VALUES = 64  # a column of fewer is written in full
+CODED_STEPS = 8  # between neighbouring samples of a column that increases
 
 
 def numbers_json(figure: Figure | Figure3D) -> str:
@@ -38,13 +41,14 @@ def _space(figure: Figure3D) -> Panel:
 
 def _panel(panel: Panel, columns: dict[str, int]) -> Json:
     own = {field.name: _plain(getattr(panel, field.name)) for field in fields(panel) if field.name != "marks"}
-    return own | {"marks": [_mark(mark, columns) for mark in assign_looks(panel.marks)]}
+    linear = not (panel.x_log or panel.y_log)
+    return own | {"marks": [_mark(mark, columns, linear) for mark in assign_looks(panel.marks)]}
 
 
-def _mark(mark: Any, columns: dict[str, int]) -> Json:
+def _mark(mark: Any, columns: dict[str, int], linear: bool) -> Json:
     values = {field.name: getattr(mark, field.name) for field in fields(mark)}
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
-    places = {name: columns.setdefault(_encode(array), len(columns)) for name, array in arrays.items()}
+    places = {name: columns.setdefault(_encode(array, linear), len(columns)) for name, array in arrays.items()}
     others = {name: _plain(value) for name, value in values.items() if name not in arrays and value not in (None, ())}
     return {"kind": type(mark).__name__, "columns": places} | others
 
@@ -58,13 +62,24 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _encode(column: Array) -> str:
+def _encode(column: Array, linear: bool) -> str:
     """A column as JSON: start, step and count where its steps are equal, else its bits in base 64.
 
-    Single precision (f) if it distinguishes neighbouring samples, otherwise double (d).
+    On linear axes, values are rounded to `CODES` steps over their range, which no page resolves (h), if neighbouring
+    samples stay apart.  Otherwise single precision (f) if it distinguishes these, else double (d).
     """
     if (step := _equal_step(column)) is not None:
         return json.dumps([float(column[0]), step, len(column)])
+    known = column[np.isfinite(column)]
+    low, step = (float(known.min()), float(np.ptp(known)) / CODES) if len(known) else (0.0, 0.0)
+    if (
+        linear
+        and len(column) > FEW_VALUES
+        and step > 0
+        and (CODED_STEPS * step <= _typical_step(column) or not is_sorted(known))
+    ):
+        codes = np.where(np.isfinite(column), np.rint((column - low) / step), CODES + 1).astype("<u2")
+        return json.dumps(f"h{low!r},{step!r},{base64.b64encode(codes.tobytes()).decode()}")
     close = float(np.nanmax(np.abs(column), initial=0.0)) > 2**20 * _typical_step(column)
     letter, form = ("d", "<f8") if close else ("f", "<f4")
     return json.dumps(letter + base64.b64encode(column.astype(form).tobytes()).decode())

@@ -33,7 +33,8 @@ def shrink(svg: str) -> str:
     styles: dict[str, str] = {}
     svg = _in_tags(svg, lambda tag: _short_tag(tag, used, styles))
     svg = _without_empty_groups(svg)
-    return re.sub(r"(<svg [^>]*>)", lambda tag: tag[1] + _sheet(svg, styles), svg, count=1)
+    svg = re.sub(r"(<svg [^>]*>)", lambda tag: tag[1] + _sheet(svg, styles), svg, count=1)
+    return _in_tags(svg, lambda tag: tag.replace('"', "'"))  # which a data URL need not escape
 
 
 def _in_tags(svg: str, change: Callable[[str], str]) -> str:

@@ -12,13 +12,16 @@ function numbersOf(figure) {
   return numbersOfFigures.get(figure);
 }
 
-// A column is [start, step, count], or single (f) or double (d) precision in base 64.
+// A column is [start, step, count], or base 64: single (f) or double (d) precision, or steps above a value (h).
 function decode(column) {
   if (Array.isArray(column)) {
     const [start, step, count] = column;
     return Float64Array.from({ length: count }, (_, i) => start + i * step);
   }
-  const bytes = Uint8Array.from(atob(column.slice(1)), (letter) => letter.charCodeAt(0));
+  const [start, step] = column[0] === "h" ? column.slice(1).split(",").map(Number) : [];
+  const text = column.slice(1 + column.lastIndexOf(","));
+  const bytes = Uint8Array.from(atob(step ? text : column.slice(1)), (letter) => letter.charCodeAt(0));
+  if (step) return Float64Array.from(new Uint16Array(bytes.buffer), (code) => (code === 65535 ? NaN : start + code * step));
   return column[0] === "f" ? new Float32Array(bytes.buffer) : new Float64Array(bytes.buffer);
 }
 
