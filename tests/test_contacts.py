@@ -28,7 +28,9 @@ from davinci_forces.maths.uncertainty.bootstrap import (
 )
 from davinci_forces.maths.uncertainty.day_offset import day_offset
 from davinci_forces.maths.uncertainty.error_band import levels
-from davinci_forces.records import Threshold, Track
+from davinci_forces.records import Contact, Threshold, Track
+from davinci_forces.report.content import Number
+from davinci_forces.report.sections.contacts import interval, largest
 from davinci_forces.stages.forces import assess, measure
 from tests import arm
 from tests.test_averaging import entry
@@ -344,3 +346,23 @@ def test_leaving_out_units_gives_the_standard_error_of_a_mean_of_units():
     found = bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), unit)
     assert found == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
     assert np.isnan(bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
+
+
+def test_the_pdf_prints_the_contacts_that_are_largest_beside_their_joints_level():
+    """On joints with other units, in the order of the table."""
+    sizes = {"hand_roll": np.linspace(0.1, 1.2, 12), "instrument_slide": np.linspace(-1.0, -24.0, 24)}
+    contacts = [
+        Contact(
+            log="push", joint=joint, filter="ekf", level_from="x", detection_level=np.abs(peak).max() / 2,
+            alarm_level=0.1, **dict.fromkeys(Contact.columns(), np.ones(len(peak))) | {"peak": peak},
+        )
+        for joint, peak in sizes.items()
+    ]  # fmt: skip
+    printed = largest(contacts)
+    assert len(printed) == 20
+    assert printed == tuple(sorted([*range(5, 12), *range(12 + 11, 12 + 24)]))
+
+
+def test_the_interval_of_a_peak_is_95_percent():
+    assert interval(Number(-2.0, "N", std=0.1)) == "−2.20 to −1.80"
+    assert interval(Number(-2.0, "N")) == interval("–") == "–"

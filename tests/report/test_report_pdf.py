@@ -190,3 +190,11 @@ def test_a_warning_of_typst_is_an_error(tmp_path: Path) -> None:
 def test_a_wrong_equation_is_an_error() -> None:
     with pytest.raises(NotTypeset, match=r"report\.typ"):
         pdf.render(one(Equation("nonsense(", "?")))
+
+
+@poppler
+def test_a_table_of_printed_rows_counts_the_others() -> None:
+    rows = tuple((f"row-{i}", Number(float(i), "N")) for i in range(30))
+    text = re.sub(r"\s+", " ", read(pdf.render(one(Table("Contacts.", ("a", "b"), rows, printed=(3, 7))))))
+    assert "Contacts. 28 more in the HTML report." in text
+    assert [row for row, _ in rows if re.search(rf"{row}\b", text)] == ["row-3", "row-7"]

@@ -67,7 +67,8 @@ class Equation:
 class Table:
     """Rows under a header; a unit that all numbers of a column share moves to its header, so never write one there.
 
-    `align` is one letter per column (l, c or r); without it, columns of numbers are right and others left.
+    `align` is one letter per column (l, c or r); without it, columns of numbers are right and others left.  The PDF has
+    the rows of the numbers `printed` only, if given, and counts the others; the HTML has all of them, unfolded.
     """
 
     caption: str
@@ -75,6 +76,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     label: str | None = None
     align: str = ""
+    printed: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         wrong = [len(row) for row in self.rows if len(row) != len(self.header)]

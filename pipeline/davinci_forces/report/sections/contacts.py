@@ -1,14 +1,29 @@
 """Every contact with its effort and error, against the detection level; and recordings that are not analysed."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Stiffness, Track, Weight
-from davinci_forces.report.content import Block, Cell, Figure, HBand, Panel, Points, Prose, Section, Table, literal
+from davinci_forces.report.content import (
+    Block,
+    Cell,
+    Figure,
+    HBand,
+    Number,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    literal,
+)
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import paper_or_screen
 from davinci_forces.study import LogEntry
+
+PRINTED = 20  # contacts of the PDF at most
 
 
 def section(context: Context) -> Section | None:
@@ -33,15 +48,15 @@ def blocks(context: Context) -> Iterator[Block]:
             "in free space stay below this level."
         )
         yield peaks(contacts)
-        yield from paper_or_screen(
-            Table(
-                "Contacts, log by log. Detected: whether the peak exceeds the detection level; “peak only” if it does "
-                "but stays below the alarm level; “found, not stated” for a contact outside the study's windows.",
-                ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Detected"),
-                tuple(row for contact in contacts for row in rows(context, contact)),
-                "contact-table",
-                "llrrrrrl",
-            )
+        yield Table(
+            "Contacts, log by log; the PDF has those of the largest peaks over detection level. Interval: 95 % of the "
+            "peak. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below the "
+            "alarm level; “not stated” for a contact that was found outside the study's windows.",
+            ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict"),
+            tuple(row for contact in contacts for row in rows(context, contact)),
+            "contact-table",
+            "llrrrrrrl",
+            largest(contacts),
         )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
@@ -53,19 +68,35 @@ def blocks(context: Context) -> Iterator[Block]:
         )
 
 
+def largest(contacts: list[Contact]) -> tuple[int, ...]:
+    """The rows of the `PRINTED` largest peaks over their joint's detection level, in the order of the table."""
+    ratios = np.concatenate([np.abs(contact.peak) / contact.detection_level for contact in contacts])
+    return tuple(sorted(np.argsort(-ratios, kind="stable")[:PRINTED].tolist()))
+
+
 def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
     """One row a window."""
-    for i, above in enumerate(contact.above, 1):
-        key = f"contact.{contact.log}.{contact.joint}.{i}"
-        numbers = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
-        yield (literal(contact.log), title(contact.joint), *numbers, detection(contact, i - 1, bool(above)))
+    for i in range(len(contact)):
+        key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
+        onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
+        plain = peak if isinstance(peak, str) else replace(peak, std=None)  # as the interval has its error
+        numbers = (onset, release, plain, interval(peak), mean, impulse)
+        yield (literal(contact.log), title(contact.joint), *numbers, verdict(contact, i))
 
 
-def detection(contact: Contact, i: int, above: bool) -> str:
+def interval(peak: Number | str) -> str:
+    """The 95 % interval of a peak."""
+    if isinstance(peak, str) or peak.std is None or not peak.std > 0:
+        return "–"
+    half = NORMAL_95 * peak.std
+    return " to ".join(Number(end, digits=3).text for end in (peak.value - half, peak.value + half))
+
+
+def verdict(contact: Contact, i: int) -> str:
     """Whether a contact is detected, or was found outside the windows that the study states."""
     if not contact.stated[i]:
-        return "found, not stated"
-    return ("yes" if contact.found[i] else "peak only") if above else "no"
+        return "not stated"
+    return ("detected" if contact.found[i] else "peak only") if contact.above[i] else "not detected"
 
 
 def peaks(contacts: list[Contact]) -> Figure:

@@ -1,6 +1,7 @@
 """The report as PDF, typeset by Typst: the template reads the document as data, so no text can become markup."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,10 +68,12 @@ def _paragraphs(text: str) -> list[list[Json]]:
 
 
 def _table(table: Table) -> Json:
-    shown = columns(table)
+    rows = table.rows if table.printed is None else tuple(table.rows[i] for i in table.printed)
+    more = f" {len(table.rows) - len(rows)} more in the HTML report." * (len(rows) < len(table.rows))
+    shown = columns(replace(table, rows=rows))
     cells = [[_inline(_unbroken(cell.text, column.align)) for cell in column.cells] for column in shown]
     return {
-        "caption": _inline(table.caption),
+        "caption": _inline(table.caption + more),
         "aligns": [column.align for column in shown],
         "header": [_inline(column.head) for column in shown],
         "rows": [list(row) for row in zip(*cells, strict=True)],

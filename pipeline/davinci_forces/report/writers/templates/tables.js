@@ -8,7 +8,7 @@ for (const region of document.querySelectorAll(".table")) prepareTable(region);
 function prepareTable(region) {
   const body = region.querySelector("tbody");
   const rows = [...body.rows];
-  const state = { words: "", folded: rows.length > FOLDED_BEYOND };
+  const state = { words: "", folded: rows.length > FOLDED_BEYOND && !region.matches(".whole") };
   const update = () => {
     let shown = 0;
     for (const row of body.rows) {
