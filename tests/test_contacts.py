@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from davinci_forces.maths.contact.detection import (
     FALSE_ALARMS,
@@ -16,6 +17,7 @@ from davinci_forces.maths.contact.detection import (
 )
 from davinci_forces.maths.periods.shift import likeness, most_different
 from davinci_forces.maths.signals.smoothing import lowpass, lowpass_segments, noise_std, share_passed
+from davinci_forces.maths.signals.whiteness import acf1_std, autocorrelation, moment_std, shape
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.bootstrap import (
@@ -24,6 +26,7 @@ from davinci_forces.maths.uncertainty.bootstrap import (
     error_of_pooled_mean,
     error_of_quantile,
     model_error,
+    root_mean_square,
     standard_error,
 )
 from davinci_forces.maths.uncertainty.day_offset import day_offset
@@ -87,6 +90,23 @@ def test_the_block_bootstrap_knows_that_correlated_samples_say_less():
     found = standard_error(lambda parts: float(np.mean(parts)), means)
     assert error_of_mean(means) == pytest.approx(found, rel=1e-12)
     assert found == pytest.approx(true, rel=4 / np.sqrt(2 * len(means)))
+
+
+def test_standard_errors_of_errors_and_moments_are_what_they_scatter_by():
+    """Autoregressions of .6, over 200 seeds: what is stated, against what comes out."""
+    e, y = (lfilter([1.0], [1.0, -0.6], np.random.default_rng(s).normal(size=(200, 2000)))[:, 100:] for s in (1, 2))
+    pairs = {
+        "rmse": [root_mean_square(x) for x in e],
+        "relative": [root_mean_square(x, 3.0 * scale) for x, scale in zip(e, y, strict=True)],
+        "model error": [model_error(x, 0.5) for x in e],
+        "acf1": [(r := float(autocorrelation([x], 1)[1]), acf1_std(r, len(x))) for x in e],
+        "skewness": [(shape(x)[0], moment_std(3, 0.6, len(x))) for x in e],
+        "kurtosis": [(shape(x)[1], moment_std(4, 0.6, len(x))) for x in e],
+    }
+    for name, numbers in pairs.items():
+        value, std = np.array(numbers).T
+        # The standard deviation of 200 is known to 5 %; 20 blocks of 95 samples miss 4 % of the correlation.
+        assert np.sqrt(np.mean(std**2)) == pytest.approx(value.std(), rel=4 * 0.05), name
 
 
 @pytest.mark.parametrize("samples", [2, 33, 1000, 4321])

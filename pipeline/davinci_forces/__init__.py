@@ -74,7 +74,8 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
 def results(study: str | Path) -> "pd.DataFrame":
     """Read all numbers of a study's report by key: `results("raw/mine").loc["period.roll", "value"]`.
 
-    The columns are value, std (NaN for numbers without one), unit, and source, the record of the number.
+    The columns are value, std (NaN for numbers without one), unit, source, the record of the number, and std_reason,
+    why it has no std.
 
     Raises
     ------

@@ -29,7 +29,8 @@ def stiffness(log="pushes", k=K, pushes=3) -> Stiffness:
     empty = np.zeros(0)
     columns = dict.fromkeys(Stiffness.columns(), empty)
     about = {"log": log, "source": "force sensor", "swings": 3, "stiffness": k, "stiffness_std": 1.0}
-    return Stiffness(**about, stiffness_std_model=0.0, stiffness_q1=k, stiffness_q3=k, pushes=pushes, **columns)
+    about |= {"stiffness_std_model": 0.0, "stiffness_q1": k, "stiffness_q3": k, "pushes": pushes}
+    return Stiffness(**dict.fromkeys(Stiffness.scalars(), 0.0) | about | columns)
 
 
 def comparison(label, joint="instrument_slide", log="a", delay=0.0) -> Comparison:

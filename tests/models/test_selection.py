@@ -139,7 +139,7 @@ def test_every_scheme_leaves_every_cell_out_once_in_few_groups(logs):
 def worth(error: float, spread: float = 0.0, seed: int = 0) -> CrossValidation:
     """A candidate of this relative error, its groups' errors scattered by this share."""
     shares = 1.0 + spread * np.random.default_rng(seed).uniform(-1, 1, (6, 1))
-    return CrossValidation((error**2 * shares / shares.sum(),), np.array([error]))
+    return CrossValidation(*[(error**2 * shares / shares.sum(),)] * 2)
 
 
 def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
@@ -155,7 +155,7 @@ def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
 @pytest.mark.parametrize(("score", "overfits"), [(0.1, False), (0.1 + 1e-13, False), (0.101, False), (0.3, True)])
 def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse(score, overfits):
     """0.101 is within the standard error of the difference; equal scores are no overfitting."""
-    results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(training=np.array([0.01]))]
+    results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     assert standard_error(results[1], results[0]) > 0.001
     named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
     assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits

@@ -11,22 +11,10 @@ NOTHING = np.zeros(0)
 
 def prediction(**scores: Any) -> Prediction:
     """A prediction of a run; its effort has a root mean square of 1."""
-    names = (
-        "rmse",
-        "nrmse",
-        "fit_percent",
-        "r2",
-        "r2_ceiling",
-        "model_error",
-        "model_error_std",
-        "mean_error",
-        "mean_error_std",
-        "relative_error",
-    )
     about = {"log": "run", "joint": "roll", "model": "independent", "estimator": "lse", "role": "validation"}
-    names += ("relative_error_1111",)
     about |= {"scheme": "validation", "path": "another path"}
-    values = about | dict.fromkeys(names, 0.0) | {"effort_rms": 1.0, "t": NOTHING, "tau": NOTHING, "tau_hat": NOTHING}
+    columns = dict.fromkeys(Prediction.columns(), NOTHING)
+    values = dict.fromkeys(Prediction.scalars(), 0.0) | {"effort_rms": 1.0} | columns | about
     return Prediction(**(values | scores))  # type: ignore[arg-type]
 
 

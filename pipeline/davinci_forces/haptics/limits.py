@@ -103,12 +103,15 @@ def limits_of(
         return hand_settles(replace(scenario, force_delay=scenario.force_delay + delay), hand)
 
     margin = delays.max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if hand_settles(scenario, hand) else 0.0
+    checks = {"k_t_response": by_response, "k_t_simulated": simulated, "k_t_settles": settles,
+              "k_t_best": float(k_t_delay[best])}  # fmt: skip
+    share = measured["k_t_limit_std"] / (measured["k_t_limit"] or math.nan)  # all have the arm and the filter in common
     needed = delays.damping_needed(hand, tissue, lambda damped: delays.response_limit(damped, *loop)[0])
     return HandLimit(
         hand=name, hand_mass=hand.m, hand_damping=hand.b, hand_stiffness=hand.k, link_rate=scenario.link_rate,
-        k_t_response=by_response, k_t_simulated=simulated, k_t_settles=settles, k_t_cqlf=cqlf_limit(hand),
-        k_t_switching=switching_limit(hand), best_delay=float(added[best]), k_t_best=float(k_t_delay[best]),
-        damping_needed=needed, delay_margin=margin, delay=added, k_t_delay=k_t_delay, **measured,
+        k_t_cqlf=cqlf_limit(hand), k_t_switching=switching_limit(hand), best_delay=float(added[best]),
+        damping_needed=needed, delay_margin=margin, delay=added, k_t_delay=k_t_delay, **measured, **checks,
+        **{f"{name}_std": limit * share for name, limit in checks.items()},
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from davinci_forces.maths.selection import (
     standard_error,
     sum_all,
 )
+from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.records.prediction import CHOSEN
 
 LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
@@ -38,7 +39,9 @@ class Selection:
     score: Array
     score_std: Array
     training: Array
+    training_std: Array
     over_periods: Array  # scores with periods left out; NaN if no path repeats
+    over_periods_std: Array
     chosen: Candidate
     best: Candidate
     why: str
@@ -58,7 +61,9 @@ class BlockEstimate(NamedTuple):
     theta_std: Array
     samples: int
     mse: float
+    mse_std: float
     r2: float
+    r2_std: float
     condition: float
 
 
@@ -72,13 +77,16 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     physical = [c.is_physical for c in models]
     eligible = physical if any(physical) else [True] * len(models)
     chosen, best = choose_candidate(results, [c.rank for c in models], eligible)
+    repeated = np.array([over_periods(c, count) for c in models])
     return Selection(
         candidates=tuple(models),
         physical=tuple(physical),
         score=np.array([result.score for result in results]),
         score_std=np.array([standard_error(result) for result in results]),
-        training=np.array([result.training.mean() for result in results]),
-        over_periods=np.array([over_periods(c, count) for c in models]),
+        training=np.array([result.fit.score for result in results]),
+        training_std=np.array([standard_error(result.fit) for result in results]),
+        over_periods=repeated[:, 0],
+        over_periods_std=repeated[:, 1],
         chosen=models[chosen],
         best=models[best],
         why=reason(models, results, [c.size for c in models], chosen, best),
@@ -97,7 +105,7 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
     winner = min(both, key=lambda selection: selection.score_of(selection.chosen))
     columns = {
         name: np.concatenate([getattr(selection, name) for selection in both])
-        for name in ("score", "score_std", "training", "over_periods")
+        for name in ("score", "score_std", "training", "training_std", "over_periods", "over_periods_std")
     }
     return Selection(
         candidates=tuple(c for selection in both for c in selection.candidates),
@@ -109,15 +117,15 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
     )
 
 
-def over_periods(candidate: Candidate, count: int) -> float:
-    """Return the score on periods left out, whose path is that of the fitted periods; NaN if no path repeats."""
+def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:
+    """Score a candidate on periods left out, on the path of the fitted ones; NaN with its error if no path repeats."""
     number = np.tile(np.arange(MAX_GROUPS), count)
     squares = np.concatenate([part.library.cells.by_period.squares for part in candidate.parts], axis=1)
     groups = np.array([number == k for k in range(MAX_GROUPS) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
-        return float("nan")
+        return float("nan"), float("nan")
     errors = candidate.cross_validate([groups], by_period=True)
-    return errors.score if errors else float("nan")
+    return (errors.score, standard_error(errors)) if errors else (float("nan"), float("nan"))
 
 
 def reason(
@@ -134,7 +142,7 @@ def reason(
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
             f"{clearly}, and it has {sizes[best]} parameters instead of {sizes[i]}"
         )
-    training = [result.training.mean() for result in results]
+    training = [result.fit.score for result in results]
     closest = int(np.argmin(training))
     excess = results[closest].score - results[i].score
     if excess > max(LAST_DIGIT, standard_error(results[closest], results[i])):
@@ -164,11 +172,19 @@ def parameters(
                 theta_std_model=model,
                 theta_std=np.hypot(noise, model),
                 samples=int(samples.max()),
-                mse=float((errors / samples).sum()),
-                r2=float(1.0 - errors.sum() / total.squares[0].sum()),
                 condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
+                **scores(part, theta),
             ),
         )
+
+
+def scores(part: CandidatePart, theta: Array) -> dict[str, float]:
+    """Compute the mean squared error and R2 of parameters (p,), with standard errors by blocks of path."""
+    cells, total, samples = part.by_block, sum_all(part.by_block), part.library.cells.samples
+    errors, by_cell = total.errors(theta)[0], (cells.errors(theta) / samples).sum(axis=1)[cells.squares.any(axis=1)]
+    mse, std = float((errors / samples).sum()), len(by_cell) * error_of_mean(by_cell)
+    unexplained = float(errors.sum() / total.squares.sum())
+    return {"mse": mse, "mse_std": std, "r2": 1.0 - unexplained, "r2_std": unexplained * std / (mse or 1.0)}
 
 
 class ConsistentFit(NamedTuple):
@@ -192,11 +208,8 @@ def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
     """
     equations, samples = sum_all(part.by_block), part.library.cells.samples
     fit = nearest(factor(equations, part.ridge), part.model.mechanism)
-    errors, squares = equations.errors(fit.theta)[0], float(equations.squares.sum())
-    estimate = free._replace(
-        theta=fit.theta, mse=float((errors / samples).sum()), r2=float(1.0 - errors.sum() / squares)
-    )
-    rmse, rmse_free = (np.sqrt(x / samples) for x in (errors, equations.errors(free.theta)[0]))
+    estimate = free._replace(theta=fit.theta, **scores(part, fit.theta))  # type: ignore[arg-type]
+    rmse, rmse_free = (np.sqrt(equations.errors(theta)[0] / samples) for theta in (fit.theta, free.theta))
     return ConsistentFit(estimate, rmse, rmse_free, fit.excess)
 
 

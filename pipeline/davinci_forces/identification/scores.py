@@ -9,7 +9,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import Estimator, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passed, white_std
-from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, model_error
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, model_error, root_mean_square
 from davinci_forces.records import Motion, Prediction
 
 MAX_FOLDS = 20  # this number of refits is enough for out-of-sample errors, whatever the amount of data
@@ -61,6 +61,7 @@ class Scorer:
         self.free = slice(None) if free.all() else free
         tau = motion.tau[self.free]
         self.smooth = self._smoothed(motion.tau)[self.free]
+        self.effort = root_mean_square(self.smooth)
         self.range, self.variance = float(np.ptp(tau)) or 1.0, float(tau.var()) or 1.0
         self.spread = float(np.linalg.norm(tau - tau.mean())) or 1.0
         self.passed = share_passed(motion.rate, lowpass)
@@ -72,7 +73,12 @@ class Scorer:
         noise = white_std(error - slow, self.passed) if self.white is None else self.white
         error, slow = error[self.free], slow[self.free]
         unexplained = float(np.linalg.norm(error)) / self.spread
-        rmse = float(np.sqrt(error @ error / len(error)))
+        rmse, rmse_std = root_mean_square(error)
+        unexplained_std = unexplained * rmse_std / (rmse or 1.0)
+        relative, relative_std = root_mean_square(slow, self.smooth)
+        rival, rival_std = root_mean_square(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL])
+        effort_rms, effort_rms_std = self.effort
+        ceiling = noise**2 / self.variance
         beyond_noise, beyond_noise_std = model_error(slow, noise * np.sqrt(self.passed))
         return Prediction(
             log=self.motion.log,
@@ -83,17 +89,25 @@ class Scorer:
             scheme=scheme,
             path=path,
             rmse=rmse,
+            rmse_std=rmse_std,
             nrmse=rmse / self.range,
+            nrmse_std=rmse_std / self.range,
             r2=1.0 - unexplained**2,
+            r2_std=2.0 * unexplained * unexplained_std,  # for this effort, whose variance is known
             fit_percent=100.0 * (1.0 - unexplained),
-            r2_ceiling=1.0 - noise**2 / self.variance,
+            fit_percent_std=100.0 * unexplained_std,
+            r2_ceiling=1.0 - ceiling,
+            r2_ceiling_std=ceiling * float(np.sqrt(2.0 / len(error))),  # the noise is white
             model_error=beyond_noise,
             model_error_std=beyond_noise_std,
             mean_error=float(np.mean(slow)),
             mean_error_std=error_of_pooled_mean(slow),
-            effort_rms=float(np.sqrt(np.mean(self.smooth**2))),
-            relative_error=relative(slow, self.smooth),
-            relative_error_1111=relative(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL]),
+            effort_rms=effort_rms,
+            effort_rms_std=effort_rms_std,
+            relative_error=relative,
+            relative_error_std=relative_std,
+            relative_error_1111=rival,
+            relative_error_1111_std=rival_std,
             t=self.motion.t,
             tau=self.motion.tau,
             tau_hat=tau_hat,
@@ -106,8 +120,3 @@ class Scorer:
 def select_samples(motion: Motion, which: Booleans | slice) -> Motion:
     """Return some of the samples (N,) of a recording."""
     return replace(motion, **{name: getattr(motion, name)[which] for name in motion.columns()})
-
-
-def relative(error: Array, tau: Array) -> float:
-    """Return the norm of an error (N,) over that of the effort (N,)."""
-    return float(np.linalg.norm(error) / (np.linalg.norm(tau) or 1.0))

@@ -185,7 +185,7 @@ class CrossValidation(NamedTuple):
     """Relative squared errors of a candidate on the data that its fits left out, by scheme."""
 
     unseen: tuple[Array, ...]  # of each scheme (G, m): squared error of a group over the effort's square in all groups
-    training: Array  # (m,) relative error of the fit to all data
+    fitted: tuple[Array, ...]  # likewise of the fit to all data
 
     @property
     def errors(self) -> Array:
@@ -196,6 +196,11 @@ class CrossValidation(NamedTuple):
     def score(self) -> float:
         """The mean of the relative errors."""
         return float(self.errors.mean())
+
+    @property
+    def fit(self) -> "CrossValidation":
+        """The errors of the fit to all data, as if no group had been left out."""
+        return CrossValidation(self.fitted, self.fitted)
 
 
 def cross_validate(
@@ -212,19 +217,20 @@ def cross_validate(
     """
     scored = scored or equations
     whole = scored.squares.sum(axis=0)
-    unseen = []
+    unseen, fitted, of_all = [], [], solve(sum_all(equations), ridge)
     for groups in schemes:
         thetas = [solve(equations.omit_cells(out), ridge) for out in groups]
-        errors = [scored.sum_cells(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
+        sums = [scored.sum_cells(out) for out in groups]
+        errors = [group.errors(theta)[0] for group, theta in zip(sums, thetas, strict=True)]
         unseen.append(np.array(errors) / whole)
-    theta = solve(sum_all(equations), ridge)
-    return CrossValidation(tuple(unseen), np.sqrt(scored.errors(theta).sum(axis=0) / whole))
+        fitted.append(np.array([group.errors(of_all)[0] for group in sums]) / whole)
+    return CrossValidation(tuple(unseen), tuple(fitted))
 
 
 def combine_efforts(parts: Sequence[CrossValidation]) -> CrossValidation:
     """Combine the fits to different efforts into one candidate."""
-    unseen = tuple(np.concatenate(shares, axis=1) for shares in zip(*(part.unseen for part in parts), strict=True))
-    return CrossValidation(unseen, np.concatenate([part.training for part in parts]))
+    columns = zip(*parts, strict=True)
+    return CrossValidation(*(tuple(np.concatenate(s, axis=1) for s in zip(*c, strict=True)) for c in columns))
 
 
 def standard_error(candidate: CrossValidation, reference: CrossValidation | None = None) -> float:

@@ -97,7 +97,9 @@ class Track(LogJointRecord):
     at_rest: int
     rate: float
     tau_ext_rms: float
+    tau_ext_rms_std: float
     nis_mean: float
+    nis_mean_std: float
     r_q: float
     r_dq: float
     q_dq: float
@@ -132,9 +134,8 @@ class Track(LogJointRecord):
     def published(self) -> Iterator[Published]:
         """The effort outside contacts, the noise that the filter assumes, and the parts of its standard deviation."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
-        names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
-        yield from self.publish(prefix, *names)
-        yield from self.publish(prefix, "model_part", "day_offset", with_std=True)
+        yield from self.publish(prefix, "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
+        yield from self.publish(prefix, "tau_ext_rms", "nis_mean", "model_part", "day_offset", with_std=True)
         yield from self.publish(f"effort.{self.log}.{self.joint}", "smooth_part")
 
 

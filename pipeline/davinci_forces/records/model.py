@@ -33,7 +33,9 @@ class Fit(Record):
     samples: int
     periods: int
     mse: float
+    mse_std: float
     r2: float
+    r2_std: float
     condition: float
     correlated_lags: int
     parameter: Labels
@@ -54,7 +56,8 @@ class Fit(Record):
             yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
             for part in ("noise", "model", "classical"):
                 yield Published(f"{prefix}.{slug(parameter)}.std_{part}", f"theta_std_{part}", row=i)
-        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
+        yield from self.publish(prefix, "mse", "r2", with_std=True)
+        yield from self.publish(prefix, "condition", "samples", "periods")
         yield Published(f"{prefix}.hac_lags", "correlated_lags")  # results.json had this key before the field
 
 
@@ -67,6 +70,7 @@ class Guess(Record):
 
     group: str
     mse: float
+    mse_std: float
     parameter: Labels
     unit: Labels
     theta: Column
@@ -75,7 +79,7 @@ class Guess(Record):
         """The parameters, and the mean squared error that they leave."""
         for i, parameter in enumerate(self.parameter):
             yield Published(f"guess.{self.group}.{slug(parameter)}", "theta", row=i)
-        yield from self.publish(f"guess.{self.group}", "mse")
+        yield from self.publish(f"guess.{self.group}", "mse", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +114,14 @@ class SwarmSearch(Record):
     iterations: int
     excess: float
     mse: float
+    mse_std: float
     best_mse: Column
 
     def published(self) -> Iterator[Published]:
         """The error reached, and the number of iterations."""
-        yield from self.publish(".".join(("search", *self.key)), "mse", "excess", "searched", "swarms", "iterations")
+        prefix = ".".join(("search", *self.key))
+        yield from self.publish(prefix, "mse", with_std=True)
+        yield from self.publish(prefix, "excess", "searched", "swarms", "iterations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +188,7 @@ class Choice(Record):
     """The model of a joint, or of the arm, that cross-validation chose from candidates."""
 
     KEY = ("group",)
-    UNKNOWN = ("over_periods",)
+    UNKNOWN = "over_periods", "over_periods_std"
     ROWS = "candidate"
 
     group: str
@@ -199,14 +206,16 @@ class Choice(Record):
     score: Column
     score_std: Column
     training: Column
+    training_std: Column
     over_periods: Column
+    over_periods_std: Column
 
     def published(self) -> Iterator[Published]:
         """The scores of every candidate."""
         for i, candidate in enumerate(self.candidate):
             prefix = f"choice.{self.group}.{slug(candidate)}"
-            yield Published(f"{prefix}.score", "score", std="score_std", row=i)
-            yield from self.publish(prefix, "training", "over_periods", "parameters", row=i)
+            yield from self.publish(prefix, "score", "training", "over_periods", row=i, with_std=True)
+            yield from self.publish(prefix, "parameters", row=i)
 
 
 @dataclass(frozen=True, eq=False)

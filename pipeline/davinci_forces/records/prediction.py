@@ -25,17 +25,25 @@ class Prediction(LogJointRecord):
     scheme: str  # "validation", "contact", "leave one log out", "leave 5 logs out", ...
     path: str  # "another path" than the fitted ones, or the "same path", on which the model's error repeats
     rmse: float
+    rmse_std: float
     nrmse: float
+    nrmse_std: float
     r2: float
+    r2_std: float
     fit_percent: float
+    fit_percent_std: float
     r2_ceiling: float
+    r2_ceiling_std: float
     model_error: float
     model_error_std: float
     mean_error: float
     mean_error_std: float
     effort_rms: float
+    effort_rms_std: float
     relative_error: float
+    relative_error_std: float
     relative_error_1111: float
+    relative_error_1111_std: float
     t: Column
     tau: Column
     tau_hat: Column
@@ -49,8 +57,8 @@ class Prediction(LogJointRecord):
     def published(self) -> Iterator[Published]:
         """The scores."""
         scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
-        yield from self.publish(self.prefix, *scores, "relative_error", "relative_error_1111")
-        yield from self.publish(self.prefix, "model_error", "mean_error", with_std=True)
+        errors = ("relative_error", "relative_error_1111", "model_error", "mean_error")
+        yield from self.publish(self.prefix, *scores, *errors, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

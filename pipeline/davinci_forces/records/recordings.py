@@ -149,10 +149,14 @@ class Average(LogJointRecord):
     periods: int
     t_start: float
     sigma_q: float
+    sigma_q_std: float
     sigma_dq: float
+    sigma_dq_std: float
     sigma_tau: float
+    sigma_tau_std: float
     sigma_tau_white: float
     relative_noise: float
+    relative_noise_std: float
     t: Column
     q: Column
     dq: Column
@@ -167,7 +171,8 @@ class Average(LogJointRecord):
         """The period, which the joints of a log share, and the noise between periods."""
         yield Published(f"period.{self.log}", "period", std="period_std")
         yield Published(f"period.{self.log}.periods", "periods")
-        yield from self.publish(f"noise.{self.log}.{self.joint}", "sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
+        names = ("sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
+        yield from self.publish(f"noise.{self.log}.{self.joint}", *names, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

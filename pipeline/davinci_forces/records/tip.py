@@ -167,6 +167,7 @@ class SensorForce(LogRecord):
     force_bias: float
     force_bias_std: float
     force_error_max: float
+    force_error_max_std: float
     force_range: float
     force_relative_error: float
     force_relative_error_std: float
@@ -183,7 +184,7 @@ class SensorForce(LogRecord):
         """Error, bias, range, lag and coverage."""
         prefix = f"sensor.{self.log}.{self.axis}"
         for key, name in (("rmse", "force_error"), ("bias", "force_bias"), ("relative_error", "force_relative_error"),
-                          ("lag", "sensor_lag"), ("coverage", "sensor_coverage")):  # fmt: skip
+                          ("largest", "force_error_max"), ("lag", "sensor_lag"),
+                          ("coverage", "sensor_coverage")):  # fmt: skip
             yield Published(f"{prefix}.{key}", name, std=f"{name}_std")
-        yield Published(f"{prefix}.largest", "force_error_max")
         yield Published(f"{prefix}.range", "force_range")

@@ -42,8 +42,8 @@ class Stiffness(LogRecord):
 
     ROWS = "push"
     UNKNOWN = (
-        "k_t_std", "onset_depth", "onset_depth_std", "onset", "k_t_loading", "k_t_unloading", "lost", "lost_share",
-        "x", "y", "z",
+        "k_t_std", "onset_depth", "onset_depth_std", "onset", "onset_std", "k_t_loading", "k_t_loading_std",
+        "k_t_unloading", "k_t_unloading_std", "lost", "lost_std", "lost_share", "lost_share_std", "x", "y", "z",
     )  # fmt: skip
 
     source: str  # source of the force
@@ -52,20 +52,28 @@ class Stiffness(LogRecord):
     stiffness_std: float
     stiffness_std_model: float
     stiffness_q1: float
+    stiffness_q1_std: float
     stiffness_q3: float
+    stiffness_q3_std: float
     pushes: int
     push: Counts
     counted: Counts
     k_t: Column
     k_t_std: Column
     r2: Column
+    r2_std: Column
     onset_depth: Column
     onset_depth_std: Column
     onset: Column
+    onset_std: Column
     k_t_loading: Column
+    k_t_loading_std: Column
     k_t_unloading: Column
+    k_t_unloading_std: Column
     lost: Column
+    lost_std: Column
     lost_share: Column
+    lost_share_std: Column
     x: Column
     y: Column
     z: Column
@@ -73,12 +81,12 @@ class Stiffness(LogRecord):
     def published(self) -> Iterator[Published]:
         """The median and quartiles over the pushes used, the number of these pushes, and each push if there are few."""
         prefix = f"tissue.{self.log}"
-        yield from self.publish(prefix, "stiffness", with_std=True)
-        yield from self.publish(prefix, "stiffness_q1", "stiffness_q3", "pushes")
+        yield from self.publish(prefix, "stiffness", "stiffness_q1", "stiffness_q3", with_std=True)
+        yield from self.publish(prefix, "pushes")
         for i in range(len(self) if len(self) <= MAX_LISTED_PUSHES else 0):
             key = f"{prefix}.{self.push[i]}"
-            yield from self.publish(key, "k_t", "onset_depth", row=i, with_std=True)
-            yield from self.publish(key, "r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset", row=i)
+            names = ("k_t", "k_t_loading", "k_t_unloading", "r2", "lost", "lost_share", "onset", "onset_depth")
+            yield from self.publish(key, *names, row=i, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,15 +102,17 @@ class TissueModel(LogRecord):
     error: Column
     error_std: Column
     tangent: Column
+    tangent_std: Column
     damping: Column
+    damping_std: Column
     exponent: Column
+    exponent_std: Column
 
     def published(self) -> Iterator[Published]:
         """The error and the properties of each model."""
         for i, name in enumerate(self.law):
             prefix = f"tissue.{self.log}.{slug(str(name))}"
-            yield from self.publish(prefix, "error", row=i, with_std=True)
-            yield from self.publish(prefix, "tangent", "damping", "exponent", row=i)
+            yield from self.publish(prefix, "error", "tangent", "damping", "exponent", row=i, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +141,11 @@ class HandLimit(Record):
     k_t_limit: float
     k_t_limit_std: float
     k_t_response: float
+    k_t_response_std: float
     k_t_simulated: float
+    k_t_simulated_std: float
     k_t_settles: float
+    k_t_settles_std: float
     k_t_cqlf: float
     k_t_switching: float
     limit_frequency: float
@@ -144,6 +157,7 @@ class HandLimit(Record):
     felt_damping: float
     best_delay: float
     k_t_best: float
+    k_t_best_std: float
     damping_needed: float
     delay_margin: float
     delay: Column
@@ -151,8 +165,8 @@ class HandLimit(Record):
 
     def published(self) -> Iterator[Published]:
         """The hand and its limits, the headline and the filter with their errors."""
-        measured = ("k_t_limit", "filter_lag", "filter_share")
-        names = [name for name in self.scalars() if name != "hand" and not name.startswith(measured)]
+        measured = [name.removesuffix("_std") for name in self.scalars() if name.endswith("_std")]
+        names = [name for name in self.scalars() if name != "hand" and name.removesuffix("_std") not in measured]
         yield from self.publish(f"stability.{self.hand}", *names)
         yield from self.publish(f"stability.{self.hand}", *measured, with_std=True)
 

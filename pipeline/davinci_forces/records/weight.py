@@ -61,8 +61,11 @@ class Weight(LogRecord):
     mirrored_alone_std: Column
     false_mass: Column
     joint_offset: Column
+    joint_offset_std: Column
     left_rms: Column
+    left_rms_std: Column
     free_error: Column
+    free_error_std: Column
 
     def published(self) -> Iterator[Published]:
         """The mass on the stated side and on the opposite one, the scale, and the mass of the tare."""
@@ -76,7 +79,8 @@ class Weight(LogRecord):
             prefix = f"weight.{self.log}.{joint}"
             yield Published(f"{prefix}.mass", "mass_alone", std="mass_alone_std", row=i)
             yield Published(f"{prefix}.mass_mirrored", "mirrored_alone", std="mirrored_alone_std", row=i)
-            yield from self.publish(prefix, "false_mass", "joint_offset", "left_rms", "free_error", row=i)
+            yield from self.publish(prefix, "false_mass", row=i)
+            yield from self.publish(prefix, "joint_offset", "left_rms", "free_error", row=i, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

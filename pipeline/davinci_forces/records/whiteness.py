@@ -17,6 +17,7 @@ class Whiteness(LogJointRecord):
     band: float
     band_99: float
     acf1: float
+    acf1_std: float
     outside: float
     ljung_box: float
     ljung_box_lags: int
@@ -27,7 +28,9 @@ class Whiteness(LogJointRecord):
     periodogram_band_99: float
     jarque_bera_p: float
     skewness: float
+    skewness_std: float
     kurtosis: float
+    kurtosis_std: float
     white: int
     all_white: int
     lag: Counts
@@ -38,11 +41,13 @@ class Whiteness(LogJointRecord):
     def published(self) -> Iterator[Published]:
         """The tests; those of innovations are among the filter's numbers."""
         if not self.signal.startswith("innovation_"):
-            names = ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white")
-            yield from self.publish(f"whiteness.{self.log}.{self.joint}.{self.signal}", *names)
+            prefix = f"whiteness.{self.log}.{self.joint}.{self.signal}"
+            yield from self.publish(prefix, "acf1", "skewness", "kurtosis", with_std=True)
+            yield from self.publish(prefix, "ljung_box_p", "jarque_bera_p", "white")
             return
         prefix, signal = f"ekf.{self.log}.{self.joint}", self.signal.removeprefix("innovation_")
-        for name in ("acf1", "ljung_box_p", "periodogram_p", "jarque_bera_p"):
+        yield Published(f"{prefix}.acf1_{signal}", "acf1", "acf1_std")
+        for name in ("ljung_box_p", "periodogram_p", "jarque_bera_p"):
             yield Published(f"{prefix}.{name}_{signal}", name)
         yield Published(f"{prefix}.white", "all_white")
 
@@ -58,6 +63,7 @@ class Innovation(LogJointRecord):
     band: float
     band_99: float
     nis_own: float
+    nis_own_std: float
     nis_low: float
     nis_high: float
     lag: Counts
@@ -67,7 +73,8 @@ class Innovation(LogJointRecord):
 
     def published(self) -> Iterator[Published]:
         """The normalised square of this innovation alone."""
-        yield Published(f"ekf.{self.log}.{self.joint}.nis_{self.signal.removeprefix('innovation_')}", "nis_own")
+        key = f"ekf.{self.log}.{self.joint}.nis_{self.signal.removeprefix('innovation_')}"
+        yield Published(key, "nis_own", "nis_own_std")
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,47 @@ import hashlib
 import json
 import math
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from fnmatch import translate
 
 from davinci_forces.records import KINDS, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.quantities import PER_ROW
 from davinci_forces.records.record import Published
 from davinci_forces.report.content.number import Number
+
+REASONS = {  # why a number has no standard error -> patterns of its key; a study may have too few data for one
+    "exact": (  # computed without noise from exact numbers
+        "log.*.rate", "log.*.duration", "log.*.jitter", "log.*.longest_gap", "path.*", "fit.*.condition",
+        "identifiability.*", "correlation.*", "search.*.excess", "excitation.*", "robot.worst_condition",
+        "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay",
+        "stability.*.k_t_cqlf", "stability.*.k_t_switching",
+    ),
+    "stated": ("guess.*", "robot.link.*", "stability.*.hand_*", "stability.*.link_rate"),
+    "count": (
+        "log.*", "*.periods", "fit.*.samples", "fit.*.hac_lags", "choice.*.parameters", "search.*.searched",
+        "search.*.swarms", "search.*.iterations", "contact.*.above", "contact.*.stated", "contact.*.found",
+        "tissue.*.pushes",
+    ),
+    "simulated truth": ("truth.*", "control.*", "haptics.*", "stability.*"),
+    "p-value": ("*_p", "*_p_q", "*_p_dq", "*.white", "weight.*.agreement", "weight.*.agreement_mirrored"),
+    "setting": (  # chosen for all further computations
+        "choice.*.cutoff", "choice.*.effort_lag", "choice.*.ridge", "choice.*.term.*", "tuning.*", "ekf.*.r_q",
+        "ekf.*.r_dq", "ekf.*.q_dq", "ekf.*.q_tau", "haptics.tissue_stiffness", "haptics.at_frequency",
+    ),
+    "standard deviation": (  # itself one of another number, or a factor of one
+        "fit.*.std_noise", "fit.*.std_model", "fit.*.std_classical", "*.filter_part", "*.lag_part", "*.smooth_part",
+        "*.band_width", "ekf.*.clock_std", "weight.*.run_std", "weight.*.fit_std", "weight.*.false_mass",
+        "weight.*.widening", "weight.*.birge_ratio",
+    ),
+}  # fmt: skip
+TOO_FEW = "too few data"  # for a standard error
+PATTERNS = {reason: re.compile("|".join(map(translate, patterns))) for reason, patterns in REASONS.items()}
+
+
+def reason(key: str) -> str:
+    """Why numbers with such a key have no standard error; "" where they should have one."""
+    return next((reason for reason, pattern in PATTERNS.items() if pattern.match(key)), "")
 
 
 @dataclass(frozen=True)
@@ -23,6 +57,10 @@ class Result:
     unit: str
     source: str
     sha256: str
+    std_reason: str | None = field(init=False)  # why there is no `std`
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "std_reason", None if self.std is not None else reason(self.key) or TOO_FEW)
 
     def number(self, digits: int = 4) -> Number:
         """The number as a report prints it."""

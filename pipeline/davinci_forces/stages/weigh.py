@@ -20,6 +20,7 @@ from davinci_forces.maths.contact.weighing import (
     model_errors,
     moved_with,
     offset,
+    offset_std,
     residual,
     shares,
     unit_load,
@@ -29,6 +30,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
+from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
@@ -190,6 +192,7 @@ class FreeMotionErrors(NamedTuple):
     """Errors of a mass, estimated from logs of free motion."""
 
     sigma: dict[str, float]  # error of the model, by joint
+    sigma_std: dict[str, float]
     fit_std: float  # [kg] standard deviation of the error that all masses from this fit share
     false_mass: dict[str, float]  # [kg] root mean square of the mass that each joint alone tells in free motion
     widening: float
@@ -216,6 +219,7 @@ def estimate_mass(
     std = widen(free.widening * float(np.hypot(run_std, fit_std)), mass, alone[0], test)
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
+    left = np.array([root_mean_square(residual(row, mass)) for row in sides[0]])
     tare_mass = free.masses.get(weighing.tare, MassEstimate(float("nan"), float("nan"))) if tare else None
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
@@ -235,8 +239,10 @@ def estimate_mass(
         mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
         mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
         false_mass=false, joint_offset=np.array([offset(row, mass) for row in sides[0]]),
-        left_rms=np.array([float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]),
+        joint_offset_std=np.array([offset_std(row, MassEstimate(mass, std)) for row in sides[0]]),
+        left_rms=left[:, 0], left_rms_std=left[:, 1],
         free_error=np.array([free.sigma[joint] for joint in joints]),
+        free_error_std=np.array([free.sigma_std.get(joint, float("nan")) for joint in joints]),
     )  # fmt: skip
     for log, free_mass in free.masses.items():
         yield FreeWeight(log, weighing.log, free.roles[log], free_mass.mass, total_std(free_mass, free))
@@ -291,6 +297,10 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     for load in (load for ls in unseen.values() for load in ls):
         by_joint[load.joint] += rows_of([load], {}, "load")
     sigma = {joint: model_errors(rows) for joint, rows in by_joint.items()}
+    sigma_std = {
+        joint: root_mean_square(np.concatenate([residual(row, 0.0) for row in rows]))[1]
+        for joint, rows in by_joint.items()
+    }
     for load in weight_loads:  # a joint without free motion gets the residual of its weight log
         [row] = rows_of([load], {}, "load")
         sigma.setdefault(load.joint, float(np.std(residual(row, fit_mass([row]).mass))))
@@ -307,7 +317,7 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     by_shares = np.linalg.norm(weight_shares * [false_mass.get(load.joint, 0.0) for load in weight_loads])
     fit_std = max(abs(of_fitted.mass), of_fitted.std, float(by_shares))
     validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
-    return FreeMotionErrors(sigma, fit_std, false_mass, widening_factor(validation, fit_std), masses, roles)
+    return FreeMotionErrors(sigma, sigma_std, fit_std, false_mass, widening_factor(validation, fit_std), masses, roles)
 
 
 def unseen_part(load: Load) -> Load | None:

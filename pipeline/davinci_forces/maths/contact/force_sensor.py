@@ -33,6 +33,7 @@ class ForceErrors(NamedTuple):
     bias: float  # of a vector, the size of its mean error
     bias_std: float
     largest: float
+    largest_std: float
     span: float  # range of the sensor's force, the mean over components
     relative: float
     relative_std: float
@@ -68,10 +69,13 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     relative, relative_std = (x / span if span else float("nan") for x in (typical, typical_std))
     if k == 1:
         bias = float(e.mean())
-    largest = float(np.linalg.norm(e, axis=1).max())
+    worst = int(np.linalg.norm(e, axis=1).argmax())
+    largest = float(np.linalg.norm(e[worst]))
+    largest_std = float(np.sqrt(e[worst] @ C[worst] @ e[worst])) / (largest or 1.0)
     return ForceErrors(
-        rmse, rmse_std, bias, bias_std, largest, span, relative, relative_std, share, standard_error(_bias, covered)
-    )
+        rmse, rmse_std, bias, bias_std, largest, largest_std, span, relative, relative_std, share,
+        standard_error(_bias, covered),
+    )  # fmt: skip
 
 
 class Lag(NamedTuple):

@@ -24,6 +24,7 @@ from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
 # If a smaller share of a column's power is variance, an offset more than doubles the standard error.
@@ -120,6 +121,12 @@ def model_errors(rows: Sequence[Rows]) -> float:
     squares = [np.mean(residual(row, 0.0) ** 2) for row in rows]
     floor = 1e-9 * max(float(np.abs(row.x).max()) for row in rows)  # error of a model that fits exactly
     return max(float(np.sqrt(np.mean(squares))), floor)
+
+
+def offset_std(row: Rows, mass: MassEstimate) -> float:
+    """Standard error of a joint's offset: of the mean effort, and of the mass times the mean load."""
+    mean_std = error_of_pooled_mean(row.y - mass.mass * row.x)
+    return float(np.hypot(mean_std, mass.std * float(np.mean(row.x)))) if row.varies else 0.0
 
 
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:

@@ -9,6 +9,7 @@ frequency.  For white noise all ordinates have the same exponential distribution
 """
 
 from collections.abc import Sequence
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -121,6 +122,20 @@ def shape(x: Array) -> tuple[float, float, float]:
 
     _, probability, skewness, kurtosis = map(float, jarque_bera(x - x.mean()))
     return skewness, kurtosis - 3.0, probability
+
+
+def acf1_std(r: float, N: int) -> float:
+    """Standard error of the first autocorrelation r of N samples, sqrt((1 - r^2) / N).  (Bartlett, 1946)"""
+    return float(np.sqrt(max(1.0 - r**2, 0.0) / max(N, 1)))
+
+
+def moment_std(order: int, r: float, N: int) -> float:
+    """Standard error of the skewness (order 3) or kurtosis (4) of N normal samples with autocorrelations r^|k|.
+
+    sqrt(order! sum_k r^(order |k|) / N)                                                       (Lomnicki, 1961)
+    """
+    power = min(abs(r), 1.0 - 1.0 / max(N, 2)) ** order * np.sign(r) ** order
+    return float(np.sqrt(factorial(order) * (1.0 + power) / (1.0 - power) / max(N, 1)))
 
 
 def mean_square_band(N: int) -> tuple[float, float]:

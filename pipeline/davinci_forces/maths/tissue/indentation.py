@@ -196,12 +196,10 @@ def straight(depth: Array, force: Array) -> StraightLine | None:
     )
 
 
-def slope(depth: Array, force: Array) -> float:
-    """Slope [N/m] of the straight line alone; NaN if there is no line."""
-    if len(depth) < MIN_SAMPLES_LINE or not np.ptp(depth) > 0:
-        return float("nan")
-    away = depth - depth.mean()
-    return float(away @ force / (away @ away))
+def slope_with_std(depth: Array, force: Array, common: float) -> tuple[float, float]:
+    """Slope of the straight line and its standard error [N/m], with a `common` error [N]; NaN if there is no line."""
+    line = straight(depth, force)
+    return (line.k, float(np.hypot(line.k_std, slope_error(depth, common)))) if line else (float("nan"), float("nan"))
 
 
 def slope_error(depth: Array, std: float) -> float:
@@ -225,12 +223,13 @@ def work(depth: Array, force: Array) -> float:
     return float(np.sum(np.diff(depth) * (force[1:] + force[:-1]) / 2))
 
 
-def median_std(k: Array, random: Array, common: float) -> float:
+def median_std(k: Array, random: Array, common: float, factor: float = np.pi / 2) -> float:
     """Standard error of the median of stiffnesses (n,), each with an error (n,), and a `common` error.
 
-    Differences beyond the errors are due to the tissue.  The variance of a median is pi/2 that of a mean.
+    Differences beyond the errors are due to the tissue.  The variance of a median is pi/2 that of a mean, that of
+    another quantile `factor` times: p (1 - p) over the square of the normal density there.
     """
     n = len(k)
     between = max(float(np.var(k, ddof=1)) - float(np.mean(random**2)), 0.0) if n > 1 else 0.0
-    variance = (float(np.mean(random**2)) + between) / n * (np.pi / 2 if n > 2 else 1.0)
+    variance = (float(np.mean(random**2)) + between) / n * (factor if n > 2 else 1.0)
     return float(np.hypot(np.sqrt(variance), common))

@@ -162,7 +162,9 @@ class PalpatedPush(NamedTuple):
     contact: Indentation
     line: StraightLine | None  # through all of the contact; None without contact
     k_loading: float  # [N/m] slope of loading alone; NaN if loading is too short
+    k_loading_std: float
     k_unloading: float
+    k_unloading_std: float
     k_std_model: float  # [N/m] by the error of a joint's model in the force
 
     @property
@@ -224,9 +226,10 @@ def _pushed(
     error = indentation.slope_error(depth[inside], common) if line else 0.0
     if line and line.k:  # an error of the force, over the stiffness, moves the onset
         contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
-    loaded, unloaded = (indentation.slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
-    place = probing.place[part]
-    return PalpatedPush(number, probing.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
+    ways = (inside & loading, inside & ~loading)
+    loaded, unloaded = (indentation.slope_with_std(depth[way], force[way], common) for way in ways)
+    place, t = probing.place[part], probing.t[part]
+    return PalpatedPush(number, t, depth, force, d_rate, place, contact, line, *loaded, *unloaded, error)
 
 
 def remarks(pushes: Sequence[PalpatedPush]) -> Iterator[str]:

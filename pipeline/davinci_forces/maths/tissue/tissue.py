@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean, standard_error
+from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean, of_left_out, standard_error
 
 EXPONENTS = np.linspace(1.0, 2.5, 31)
 FOLDS = 20
@@ -68,6 +68,7 @@ class FittedLaw(NamedTuple):
     score_std: float
     theta: Array  # (3,) of x^n [N/m^n], v [N s/m] and x^n v [N s/m^(n+1)]
     exponent: float
+    left_out: tuple[tuple[Array, float], ...] = ()  # theta and the exponent of each fold's fit
 
 
 def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
@@ -86,14 +87,16 @@ def cross_validate_law(data: Moments, law: ForceLaw) -> FittedLaw:
     """Fit and cross-validate a model: leave out one push at a time, or a twentieth of all pushes."""
     parts = blocks(len(data.squares), FOLDS)
     A, b, _ = (column.sum(axis=0) for column in data)
-    errors, sizes = np.zeros(len(parts)), np.zeros(len(parts))
+    errors, sizes, left_out = np.zeros(len(parts)), np.zeros(len(parts)), []
     for i, part in enumerate(parts):
         A_out, b_out, sizes[i] = (column[part].sum(axis=0) for column in data)
         theta, e = fit_parameters(A - A_out, b - b_out, law)
         errors[i] = sizes[i] - 2 * theta @ b_out[e] + theta @ A_out[e] @ theta
+        left_out.append((theta, float(EXPONENTS[e])))
     theta, e = fit_parameters(A, b, law)
     pairs = list(zip(errors.tolist(), sizes.tolist(), strict=True))
-    return FittedLaw(law, errors, _relative(pairs), standard_error(_relative, pairs), theta, float(EXPONENTS[e]))
+    score, std = _relative(pairs), standard_error(_relative, pairs)
+    return FittedLaw(law, errors, score, std, theta, float(EXPONENTS[e]), tuple(left_out))
 
 
 def fit_parameters(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
@@ -116,6 +119,12 @@ def tangent(model: FittedLaw, x: float) -> tuple[float, float]:
     """Stiffness [N/m] at rest and damping [N s/m] of a model at a depth below first contact [m]."""
     k, b, b_x = model.theta
     return float(k * model.exponent * x ** (model.exponent - 1)), float(b + b_x * x**model.exponent)
+
+
+def standard_errors(model: FittedLaw, x: float) -> Array:
+    """Jackknife the standard errors (3,) of stiffness and damping at a depth [m], and exponent, over the pushes."""
+    fits = [model._replace(theta=theta, exponent=exponent) for theta, exponent in model.left_out]
+    return of_left_out(np.array([(*tangent(fit, x), fit.exponent) for fit in fits]))
 
 
 def _columns(x: Array, v: Array, exponents: Array) -> Array:

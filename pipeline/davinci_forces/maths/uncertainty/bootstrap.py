@@ -107,11 +107,28 @@ def model_error(slow: Array, noise: float) -> tuple[float, float]:
     the mean square over blocks.
     """
     squares = slow**2
-    excess = float(np.mean(squares)) - noise**2
-    error = float(np.sqrt(max(excess, 0.0)))
     spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
-    # d sqrt(x) = dx / (2 sqrt(x)) diverges at 0: there the root of the spread is the bound.
-    return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))
+    return root(float(np.mean(squares)) - noise**2, spread)
+
+
+def root_mean_square(x: Array, scale: Array | None = None) -> tuple[float, float]:
+    """Root mean square of samples (N,), over that of a scale (N,) if there is one, and its standard error.
+
+    The standard error is that of R = mean x^2 / mean y^2, from the mean of x^2 - R y^2 over blocks.
+    """
+    squares = np.ones(len(x)) if scale is None else scale**2
+    power = float(np.mean(squares)) or 1.0
+    ratio = float(np.mean(x**2)) / power
+    return root(ratio, error_of_pooled_mean(x**2 - ratio * squares) / power)
+
+
+def root(square: float, std: float) -> tuple[float, float]:
+    """Root of a number, 0 of a negative one, and its standard error from that of the number.
+
+    d sqrt(x) = dx / (2 sqrt(x)) diverges at 0: there the root of the standard error is the bound.
+    """
+    value, bound = float(np.sqrt(max(square, 0.0))), float(np.sqrt(std))
+    return value, min(std / (2.0 * value), bound) if value > 0 else bound
 
 
 def jackknife_std(statistic: Callable[[Booleans], Array], units: Integers) -> Array:

@@ -10,4 +10,16 @@ from davinci_forces.records.quantities.models import MODELS, PER_ROW, Quantity
 
 __all__ = ["PER_ROW", "QUANTITIES", "Quantity"]
 
-QUANTITIES = MODELS | FORCES | ARM
+MEASURED = MODELS | FORCES | ARM
+STANDARD_ERRORS = (  # of these symbols, whose names end in _std
+    "sigma_q", "sigma_dq", "sigma_tau", "relative_noise", "acf1", "skewness", "kurtosis", "nis_own", "k_t_response",
+    "k_t_simulated", "k_t_settles", "k_t_best", "rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms",
+    "relative_error", "relative_error_1111", "mse", "training", "over_periods",
+    "tau_ext_rms", "nis_mean", "joint_offset", "left_rms", "free_error", "stiffness_q1", "stiffness_q3", "onset",
+    "force_error_max", "k_t_loading", "k_t_unloading", "lost", "lost_share", "tangent", "damping", "exponent",
+)  # fmt: skip
+QUANTITIES = MEASURED | {
+    f"{name}_std": Quantity(f"standard error: {MEASURED[name].meaning}", MEASURED[name].unit)
+    for name in STANDARD_ERRORS
+    if f"{name}_std" not in MEASURED
+}

@@ -41,13 +41,14 @@ def results(study: Path) -> pd.DataFrame:
     file = folders(study, None, None).reports / "results.json"
     names = ["key", "value", "std", "unit", "source"]
     try:
-        rows = [[result[name] for name in names] for result in json.loads(read_bytes(file))]
+        numbers = json.loads(read_bytes(file))
+        rows = [[*(number[name] for name in names), number.get("std_reason")] for number in numbers]
     except FileNotFoundError:
         raise MissingRecord(f"{file} does not exist; run `davinci-forces all {study}`") from None
     except (ValueError, TypeError, LookupError) as error:
         advice = f"`davinci-forces report {study}` writes it again"
         raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {advice}") from None
-    frame = pd.DataFrame(rows, columns=names).set_index("key")
+    frame = pd.DataFrame(rows, columns=[*names, "std_reason"]).set_index("key")
     return frame.astype({"value": float, "std": float})
 
 

@@ -11,6 +11,7 @@ from davinci_forces.filters.response import lag, noise_model, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
 from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -58,7 +59,7 @@ def track_effort(
     friction = model.standing * model.static_friction**2 / 3.0
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
     free = free_space(model.t, entry.contact, model.rate, model.unscored)
-    model_part = float(np.sqrt(np.mean(model_variance)))
+    model_part, effort_free = float(np.sqrt(np.mean(model_variance))), (estimate.tau_ext - offset.value)[free]
     yield Track(
         log=model.log,
         joint=model.joint,
@@ -69,8 +70,10 @@ def track_effort(
         path=model.path,
         at_rest=model.at_rest,
         rate=model.rate,
-        tau_ext_rms=rms((estimate.tau_ext - offset.value)[free]),
+        tau_ext_rms=rms(effort_free),
+        tau_ext_rms_std=root_mean_square(effort_free)[1] if free.any() else float("nan"),
         nis_mean=float(np.mean(estimate.nis[converged])),
+        nis_mean_std=error_of_pooled_mean(estimate.nis[converged]),
         r_q=noise.r_q,
         r_dq=noise.r_dq,
         q_dq=noise.q_dq,

@@ -16,6 +16,7 @@ from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.whiteness import TWO_SIDED_95, TWO_SIDED_99, cross_correlation, mean_square_band
 from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run, spans
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 from davinci_forces.records import (
     Column,
     Explanation,
@@ -77,12 +78,14 @@ def statistics(x: Column) -> dict[str, object]:
         wave = whiteness.cumulative_periodogram(level)
     if np.ptp(x) > 0:
         skewness, kurtosis, normal = whiteness.shape(x)
+    acf1 = float(correlation[1]) if lags else 0.0
     band, ordinates = 1.0 / np.sqrt(N), (N - 1) // 2
     return {
         "tested": N,
         "band": float(whiteness.TWO_SIDED_95 * band),
         "band_99": float(whiteness.TWO_SIDED_99 * band),
-        "acf1": float(correlation[1]) if lags else 0.0,
+        "acf1": acf1,
+        "acf1_std": whiteness.acf1_std(acf1, N),
         "outside": float(np.mean(np.abs(correlation[1:]) > whiteness.TWO_SIDED_95 * band)) if lags else 0.0,
         "ljung_box": box.statistic,
         "ljung_box_lags": tested_lags,
@@ -93,7 +96,9 @@ def statistics(x: Column) -> dict[str, object]:
         "periodogram_band_99": whiteness.distance_of(0.01, ordinates),
         "jarque_bera_p": normal if N >= whiteness.MIN_SAMPLES_WHITENESS else 0.0,
         "skewness": skewness,
+        "skewness_std": whiteness.moment_std(3, acf1, N),
         "kurtosis": kurtosis,
+        "kurtosis_std": whiteness.moment_std(4, acf1, N),
         "white": int(box.probability > MIN_PROBABILITY),
         "lag": np.arange(lags + 1),
         "acf": correlation,
@@ -173,7 +178,8 @@ def innovation_records(model: JointModel, result: Innovations, motion: tuple[Arr
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
             log=model.log, joint=model.joint, signal=name, tested=N, band=TWO_SIDED_95 / N**0.5,
-            band_99=TWO_SIDED_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
+            band_99=TWO_SIDED_99 / N**0.5, nis_own=float(np.mean(normalised**2)),
+            nis_own_std=error_of_pooled_mean(normalised**2), nis_low=low, nis_high=high,
             lag=np.arange(lags + 1), with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
         )  # fmt: skip
 

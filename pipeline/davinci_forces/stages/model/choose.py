@@ -144,7 +144,9 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
             score=selection.score,
             score_std=selection.score_std,
             training=selection.training,
+            training_std=selection.training_std,
             over_periods=selection.over_periods,
+            over_periods_std=selection.over_periods_std,
         )
 
 

@@ -30,6 +30,7 @@ from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 from davinci_forces.records import (
     Column,
     CrossFit,
@@ -133,7 +134,7 @@ def fit_joint(
         estimates[name] = estimate
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
-        yield from (swarm_search(model, name, search) for search in estimate.searches)
+        yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
     yield from identifiability(model, parts, regression, estimates, robot, joint, others)
     yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
@@ -259,7 +260,8 @@ def fit_record(
     lowpass: float,
 ) -> Fit:
     """The Fit of an estimate, with its mean square error and R2 on its own data."""
-    residual = fit_residual(regression, estimate)
+    squares, r2 = fit_residual(regression, estimate) ** 2, r_squared(regression, estimate)
+    mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
     return Fit(
         group=model.group,
         model=model.name,
@@ -270,8 +272,10 @@ def fit_record(
         logs=tuple(part.log for part in parts),
         samples=len(regression.tau),
         periods=min(part.periods for part in parts),
-        mse=float(np.mean(residual**2)),
-        r2=r_squared(regression, estimate),
+        mse=mse,
+        mse_std=mse_std,
+        r2=r2,
+        r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
         correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
@@ -296,14 +300,16 @@ def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
     yield Guess(
         group=model.group,
         mse=float(np.mean(residual**2)),
+        mse_std=error_of_pooled_mean(residual**2),
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         theta=theta,
     )
 
 
-def swarm_search(model: IndependentJoint, name: str, search: Search) -> SwarmSearch:
+def swarm_search(model: IndependentJoint, name: str, search: Search, regression: Regression) -> SwarmSearch:
     """The record of a swarm search, with its history.  Fig 6.14"""
+    residual = (regression.tau - regression.Phi @ search.theta)[regression.periods > 0]
     return SwarmSearch(
         group=model.group,
         model=model.name,
@@ -316,6 +322,7 @@ def swarm_search(model: IndependentJoint, name: str, search: Search) -> SwarmSea
         iterations=len(search.history),
         excess=search.excess,
         mse=float(search.history[-1]),
+        mse_std=error_of_pooled_mean(residual**2),
         best_mse=search.history,
     )
 

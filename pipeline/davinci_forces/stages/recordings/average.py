@@ -12,6 +12,7 @@ from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, 
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, repetition
 from davinci_forces.maths.signals.smoothing import lowpass_segments, noise_std, segments, share_passed
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -198,6 +199,7 @@ def average_joint(
     rms_tau = float(np.sqrt(np.mean(slow_tau[used] ** 2))) or 1.0
     tau = phased.fold(signal.tau[used])
     white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    relative_noise = white * float(np.sqrt(share_passed(signal.rate, lowpass))) / rms_tau
     q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])
     yield Average(
         log=signal.log,
@@ -209,10 +211,14 @@ def average_joint(
         periods=whole_periods(phased.t, period.length, signal.rate),
         t_start=float(phased.t[0]),
         sigma_q=averaging.noise_std(q),
+        sigma_q_std=error_of_pooled_mean(q.var, function=np.sqrt),
         sigma_dq=averaging.noise_std(dq),
+        sigma_dq_std=error_of_pooled_mean(dq.var, function=np.sqrt),
         sigma_tau=averaging.noise_std(tau),
+        sigma_tau_std=error_of_pooled_mean(tau.var, function=np.sqrt),
         sigma_tau_white=white,
-        relative_noise=white * float(np.sqrt(share_passed(signal.rate, lowpass))) / rms_tau,
+        relative_noise=relative_noise,
+        relative_noise_std=relative_noise / float(np.sqrt(2.0 * len(used))),  # the noise is white
         t=np.arange(phased.K) / phased.K * period.length,
         q=q.mean,
         dq=dq.mean,

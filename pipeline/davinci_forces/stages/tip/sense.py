@@ -115,7 +115,8 @@ def sensor_force(
     yield SensorForce(
         log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), force_error=error.rmse,
         force_error_std=error.rmse_std, force_bias=error.bias, force_bias_std=error.bias_std,
-        force_error_max=error.largest, force_range=error.span, force_relative_error=error.relative,
+        force_error_max=error.largest, force_error_max_std=error.largest_std, force_range=error.span,
+        force_relative_error=error.relative,
         force_relative_error_std=error.relative_std, sensor_lag=late.value, sensor_lag_std=late.std,
         sensor_coverage=error.coverage, sensor_coverage_std=error.coverage_std, t=estimate.t,
         measured_force=measured[:, 0] if measured.shape[1] == 1 else np.linalg.norm(measured, axis=1),

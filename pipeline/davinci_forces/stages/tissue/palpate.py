@@ -23,6 +23,7 @@ from davinci_forces.maths.tissue.tissue import (
     force_of,
     moments,
     preferred_law,
+    standard_errors,
     tangent,
 )
 from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
@@ -30,6 +31,7 @@ from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
 
 MIN_R2 = 0.9  # of the straight line through a push that is used for the stiffness
+QUARTILE_FACTOR = 1.857  # of the variance of a mean: p (1 - p) over the square of the normal density, p = 1/4
 MIN_SAMPLES_PUSH = 8  # in a log, and in a push with which tissue models are compared
 FILTER = "ekf"
 
@@ -195,7 +197,10 @@ def stiffness_of(pushes: Sequence[PalpatedPush], log: str, source: str, swings: 
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
     std = median_std(k[counts], k_std[counts], common) if counts.any() else float("nan")
+    quartile_std = median_std(k[counts], k_std[counts], common, QUARTILE_FACTOR) if counts.any() else float("nan")
     lost = np.array([push.dissipated_energy for push in pushes])
+    closed = lost[np.isfinite(lost).all(axis=1)]
+    lost_std = np.full((len(k), 2), closed.std(axis=0, ddof=1) if len(closed) > 1 else np.nan)
     return Stiffness(
         log=log,
         source=source,
@@ -204,22 +209,36 @@ def stiffness_of(pushes: Sequence[PalpatedPush], log: str, source: str, swings: 
         stiffness_std=std,
         stiffness_std_model=common,
         stiffness_q1=float(low),
+        stiffness_q1_std=quartile_std,
         stiffness_q3=float(high),
+        stiffness_q3_std=quartile_std,
         pushes=int(counts.sum()),
         push=np.array([push.number for push in pushes]),
         counted=counts.astype(np.int64),
         k_t=k,
         k_t_std=np.hypot(k_std, model),
         r2=r2,
+        r2_std=2.0 * r2 * (1.0 - r2) * np.hypot(k_std, model) / np.where(k == 0.0, 1.0, np.abs(k)),  # d R2 of dk
         onset_depth=np.array([push.contact.onset for push in pushes]),
         onset_depth_std=np.array([push.contact.onset_std for push in pushes]),
         onset=np.array([push.t[int(np.argmax(push.contact.inside))] for push in pushes]),
+        onset_std=np.array([onset_time_std(push) for push in pushes]),
         k_t_loading=np.array([push.k_loading for push in pushes]),
+        k_t_loading_std=np.array([push.k_loading_std for push in pushes]),
         k_t_unloading=np.array([push.k_unloading for push in pushes]),
+        k_t_unloading_std=np.array([push.k_unloading_std for push in pushes]),
         lost=lost[:, 0],
+        lost_std=lost_std[:, 0],
         lost_share=lost[:, 1],
+        lost_share_std=lost_std[:, 1],
         **dict(zip("xyz", np.array([push.place[int(np.argmax(push.depth))] for push in pushes]).T, strict=True)),
     )
+
+
+def onset_time_std(push: PalpatedPush) -> float:
+    """Standard error of the time of first contact [s]: that of its depth over the rate of the depth there."""
+    rate = abs(float(push.rate[int(np.argmax(push.contact.inside))]))
+    return push.contact.onset_std / rate if rate > 0.0 else float("nan")
 
 
 def model_of(
@@ -228,6 +247,7 @@ def model_of(
     """Stiffness and damping of each model of the tissue at half the median depth of the pushes."""
     middle = float(np.median([push.depth_in_contact[push.contact.inside].max() for push in pushes])) / 2
     stiff, damping = np.array([tangent(model, middle) for model in models]).T
+    stiff_std, damping_std, exponent_std = np.array([standard_errors(model, middle) for model in models]).T
     return TissueModel(
         log=log,
         chosen=best.law.name,
@@ -237,6 +257,9 @@ def model_of(
         error=np.array([model.score for model in models]),
         error_std=np.array([model.score_std for model in models]),
         tangent=stiff,
+        tangent_std=stiff_std,
         damping=damping,
+        damping_std=damping_std,
         exponent=np.array([model.exponent for model in models]),
+        exponent_std=exponent_std,
     )
