@@ -14,7 +14,7 @@ import typer
 from typer.testing import CliRunner
 
 import davinci_forces
-from davinci_forces import commands, robots, stages
+from davinci_forces import commands, exports, robots, stages
 from davinci_forces.cli import app
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.logs import FORMATS
@@ -161,6 +161,10 @@ def test_stages_commands_and_options_are_those_that_there_are():
     assert named(rows("command", "does")) == list(commands.COMMANDS)
     options = {o for p in typer.main.get_command(app).commands["fit"].params for o in p.opts if o.startswith("--")}
     assert {option.split()[0] for option in named(rows("option", "does"))} == options - {"--help"}
+
+
+def test_formats_of_an_export_are_those_that_there_are():
+    assert named(rows("exported format", "writes")) == list(exports.FORMATS)
 
 
 def test_targets_of_the_makefile_are_all_told():

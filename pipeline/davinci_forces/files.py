@@ -6,6 +6,7 @@ Only regular files and links to them are read: a pipe or a device would keep a r
 import hashlib
 import os
 import re
+import shutil
 import stat
 from collections.abc import Callable, Mapping
 from io import BufferedReader, BytesIO, TextIOWrapper
@@ -107,6 +108,32 @@ def write_together(contents: Mapping[Path, bytes]) -> None:
     finally:
         for file in contents:
             name(file).unlink(missing_ok=True)
+
+
+def write_folder(folder: Path, contents: Mapping[str, bytes], replaces: bool = False) -> None:
+    """Write a folder of files, by name, completely or not at all.
+
+    Raises
+    ------
+    NotAFile
+        If the folder exists and is not to be replaced, or holds anything but files of these names.
+    """
+    partial, before = temporary_name()(folder), temporary_name()(folder)
+    try:
+        write_together({partial / name: content for name, content in contents.items()})
+        if os.path.lexists(folder):
+            foreign = [folder.name] if folder.is_symlink() or not folder.is_dir() else os.listdir(folder)
+            foreign = [name for name in foreign if name not in contents or not (folder / name).is_file()]
+            if foreign or not replaces:
+                what = f"it holds {foreign[0]!r}, which is not of this export" if foreign else "it exists"
+                raise NotAFile(0, f"{what}; name another folder", str(folder))
+            folder.rename(before)
+        partial.rename(folder)
+    finally:
+        if os.path.lexists(before) and not os.path.lexists(folder):
+            before.rename(folder)
+        for remnant in (partial, before):
+            shutil.rmtree(remnant, ignore_errors=True)
 
 
 def temporary_name() -> Callable[[Path], Path]:

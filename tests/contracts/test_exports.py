@@ -1,0 +1,206 @@
+"""Every export format: what each file says first, and numbers that a stranger computes from the files alone."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.errors import BadRequest, BadRobot
+from davinci_forces.exports import FORMATS, renderer
+from davinci_forces.exports.identified import SAFETY, export_of
+from davinci_forces.maths.models.memory import efforts
+from davinci_forces.records import Choice, JointModel
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
+from davinci_forces.robots.dvrk_psm import ROBOT as PSM
+from tests.exported import ORIGIN, RATE, export, motion
+
+
+@pytest.fixture
+def small(lab, catalogue):
+    """The export of the small study, each joint by itself."""
+    return export_of(replace(lab.study, simulated=True), catalogue, ORIGIN)
+
+
+@pytest.mark.parametrize("name", sorted(set(FORMATS) - {"urdf"}))
+def test_every_file_says_where_it_comes_from_and_that_it_is_no_medical_device(name, small):
+    files = renderer(name)(small)
+    assert files == renderer(name)(small)
+    for file, text in files.items():
+        assert re.fullmatch(r"[a-z_.]+", file)
+        for line in (ORIGIN.report_id, ORIGIN.version, SAFETY, "SIMULATED", f"exported despite: {ORIGIN.despite[0]}"):
+            assert line in text, (file, line)
+        assert "valid in the range of" in text or file.endswith("schema.json")
+    honest = replace(small, origin=ORIGIN._replace(despite=()), study=replace(small.study, simulated=False))
+    assert not any(word in text for text in renderer(name)(honest).values() for word in ("SIMULATED:", "despite: "))
+
+
+def test_a_study_without_a_chosen_model_or_a_joint_exports_nothing(lab, catalogue):
+    nothing = Catalogue(lambda kind: [] if kind is Choice else catalogue.records(kind))
+    with pytest.raises(BadRequest, match="no model was chosen"):
+        export_of(lab.study, nothing, ORIGIN)
+    with pytest.raises(BadRobot, match="no joint 'elbow'; it has hand_roll"):
+        export_of(lab.study, catalogue, ORIGIN, ["elbow"])
+    assert [j.name for j in export_of(lab.study, catalogue, ORIGIN, ["hand_pitch"]).joints] == ["hand_pitch"]
+
+
+def test_the_range_of_validity_is_that_of_logs_without_contact(small, catalogue):
+    [roll] = [joint for joint in small.joints if joint.name == "hand_roll"]
+    contact = [m for m in catalogue.select(JointModel, joint="hand_roll") if m.role == "contact"]
+    assert contact
+    assert max(np.abs(m.tau).max() for m in contact) > roll.validity.largest_effort
+    free = [m for m in catalogue.select(JointModel, joint="hand_roll") if m.role in ("identification", "validation")]
+    assert roll.validity.q == (min(m.q_measured.min() for m in free), max(m.q_measured.max() for m in free))
+
+
+# A stranger's program: it knows the file, and nothing of this package.
+FUNCTIONS = {
+    "1": lambda q, dq: 1.0, "sin q": lambda q, dq: np.sin(q), "cos q": lambda q, dq: np.cos(q), "q": lambda q, dq: q,
+    "dq": lambda q, dq: dq, "sign(dq)": lambda q, dq: np.sign(dq), "|dq|": lambda q, dq: abs(dq),
+    "|dq| dq": lambda q, dq: abs(dq) * dq, "q dq": lambda q, dq: q * dq, "q sign(dq)": lambda q, dq: q * np.sign(dq),
+    "q^2 sign(dq)": lambda q, dq: q * q * np.sign(dq), "q^2": lambda q, dq: q * q, "q^3": lambda q, dq: q**3,
+    "sin 2q": lambda q, dq: np.sin(2 * q), "cos 2q": lambda q, dq: np.cos(2 * q), "sin 3q": lambda q, dq: np.sin(3 * q),
+    "cos 3q": lambda q, dq: np.cos(3 * q),
+}  # fmt: skip
+
+
+def state(about, q, dq, segment, T):
+    """z along a motion (N,) by the formulas of the file."""
+    if about["kind"] == "deflection":
+        z = np.zeros(len(dq))
+        for k in range(len(dq) - 1):
+            s = np.sign(dq[k])
+            step = s - (s - z[k]) * np.exp(-abs(dq[k]) * T / about["displacement"])
+            z[k + 1] = step if segment[k + 1] == segment[k] else 0.0
+        return z
+    if about["kind"] == "smooth sign":
+        return np.tanh(dq / about["width"])
+    if about["kind"] == "Stribeck":
+        return np.sign(dq) * np.exp(-((dq / about["decay_velocity"]) ** 2))
+    return FUNCTIONS[about["function"]](q, dq)
+
+
+def turned(axis_moves, q):
+    """The pose of a joint's motion: Tz(q) or Rz(q)."""
+    T = np.eye(4)
+    if axis_moves:
+        T[2, 3] = q
+    else:
+        T[:2, :2] = [[np.cos(q), -np.sin(q)], [np.sin(q), np.cos(q)]]
+    return T
+
+
+def newton_euler(document, inertial, q, dq, ddq):
+    """The efforts of a chain whose links have these ten numbers, by Newton and Euler in axes of the base."""
+    g, tau, links = document["gravity"], np.zeros(len(q)), document["chain"]["links"]
+    up, moves, wrenches = np.array(document["chain"]["up"]), [], []
+    for link in links:
+        base = (np.eye(4), np.zeros(3), np.zeros(3), g * up)
+        T, w, e, a = base if link["parent"] is None else moves[link["parent"]]
+        k = link["coordinate"]
+        x, v, b = (0.0, 0.0, 0.0) if k is None else (q[k], dq[k], ddq[k])
+        pose = T @ np.array(link["placement"]) @ turned(link["prismatic"], x)
+        z, r = pose[:3, 2], pose[:3, 3] - T[:3, 3]
+        a = a + np.cross(e, r) + np.cross(w, np.cross(w, r))
+        if link["prismatic"]:
+            a = a + 2 * v * np.cross(w, z) + b * z
+        else:
+            e, w = e + b * z + v * np.cross(w, z), w + v * z
+        moves.append((pose, w, e, a))
+        m, *h, xx, xy, xz, yy, yz, zz = inertial.get(link["name"], np.zeros(10))
+        R = pose[:3, :3]
+        h, J = R @ h, R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+        f = m * a + np.cross(e, h) + np.cross(w, np.cross(w, h))
+        wrenches.append([f, np.cross(h, a) + J @ e + np.cross(w, J @ w)])
+    for i in reversed(range(len(links))):
+        (f, n), pose, link = wrenches[i], moves[i][0], links[i]
+        if link["coordinate"] is not None:
+            tau[link["coordinate"]] += pose[:3, 2] @ (f if link["prismatic"] else n)
+        if link["parent"] is not None:
+            above = wrenches[link["parent"]]
+            above[0] = above[0] + f
+            above[1] = above[1] + n + np.cross(pose[:3, 3] - moves[link["parent"]][0][:3, 3], f)
+    return tau
+
+
+TEN = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+
+def predicted(document, name, q, dq, ddq, segment, T):
+    """The effort (N,) of a joint along a motion of all joints (N, n), from the file alone."""
+    [joint] = [joint for joint in document["joints"] if joint["name"] == name]
+    i, inertial, tau = document["coordinates"].index(name), {}, np.zeros(len(q))
+    for p in document["models"][joint["model"]]["parameters"]:
+        if "link" in p:
+            inertial.setdefault(p["link"], np.zeros(10))[TEN.index(p["inertial"])] = p["value"]
+        elif p["joint"] == name:
+            z = state(p["state"], q[:, i], dq[:, i], segment, T) if p["state"] else None
+            phi = p["acceleration"] * ddq[:, i]
+            for function, c in p["functions"].items():
+                phi = phi + c * (z if function == "z" else FUNCTIONS[function](q[:, i], dq[:, i]))
+            tau += p["value"] * phi
+    if inertial:
+        tau += [newton_euler(document, inertial, *row)[i] for row in zip(q, dq, ddq, strict=True)]
+    return tau
+
+
+@pytest.mark.parametrize("robot", [DAVINCI, PSM, DAVINCI.with_base((0.3, -0.7, 0.2))], ids=["davinci", "psm", "tilted"])
+@pytest.mark.parametrize("structure", ["independent", "coupled"])
+def test_a_stranger_computes_the_predicted_effort_from_the_json_alone(robot, structure):
+    given = export(robot, structure)
+    document = json.loads(renderer("json")(given)["model.json"])
+    moved = motion(len(robot.joints))
+    for i, joint in enumerate(given.joints):
+        of_joint = moved if structure == "coupled" else moved._replace(**{
+            x: getattr(moved, x)[:, i : i + 1] for x in ("q", "dq", "ddq")})  # fmt: skip
+        tau = efforts(joint.model, joint.fit.theta, of_joint)[:, joint.model.efforts.index(joint.name)]
+        ours = predicted(document, joint.name, moved.q, moved.dq, moved.ddq, moved.segment, 1.0 / RATE)
+        assert_allclose(ours, tau, rtol=0, atol=1e-12 * np.abs(tau).max())
+
+
+def test_the_json_of_a_study_predicts_what_the_study_predicted(small, catalogue):
+    document = json.loads(renderer("json")(small)["model.json"])
+    models = [m for m in catalogue.records(JointModel) if not m.stand_in]
+    assert {m.joint for m in models} == {joint["name"] for joint in document["joints"]}
+    for m in models:
+        columns = [np.zeros((len(m), len(document["coordinates"]))) for _ in range(3)]
+        for column, name in zip(columns, ("q", "dq", "ddq"), strict=True):
+            column[:, document["coordinates"].index(m.joint)] = getattr(m, name)
+        tau = predicted(document, m.joint, *columns, m.segment, 1.0 / m.rate)
+        assert_allclose(tau, m.tau_hat, rtol=0, atol=1e-12 * np.abs(m.tau_hat).max())
+
+
+def mistakes(schema, value, place=""):
+    """Where a value is not as its schema says; only the keywords that our schema uses."""
+    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None), "integer": int}
+    types = schema.get("type", [])
+    types = [types] if isinstance(types, str) else types
+    fits = [isinstance(value, kinds.get(t, (int, float))) and (t == "boolean" or value is not True) for t in types]
+    if types and not any(fits):
+        return [f"{place}: {value!r} is not {types}"]
+    wrong = [f"{place}: {value!r}"] if value not in schema.get("enum", [value]) else []
+    if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
+        wrong.append(f"{place}: {value}")
+    if isinstance(value, dict):
+        wrong += [f"{place}: no {key}" for key in schema.get("required", ()) if key not in value]
+        for key, content in value.items():
+            inner = schema.get("properties", {}).get(key, schema.get("additionalProperties", {}))
+            wrong += mistakes(inner, content, f"{place}/{key}")
+    if isinstance(value, list):
+        size = schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value))
+        wrong += [] if size else [f"{place}: {len(value)} items"]
+        wrong += [m for i, item in enumerate(value) for m in mistakes(schema.get("items", {}), item, f"{place}/{i}")]
+    return wrong
+
+
+@pytest.mark.parametrize("structure", ["independent", "coupled"])
+def test_the_json_is_as_its_schema_says(structure):
+    files = renderer("json")(export(PSM, structure))
+    schema, document = json.loads(files["model.schema.json"]), json.loads(files["model.json"])
+    assert mistakes(schema, document) == []
+    next(iter(document["models"].values()))["parameters"][0].pop("std")
+    assert mistakes(schema, document)
+    assert set(document) - {"$schema"} == set(schema["properties"])

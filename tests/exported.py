@@ -1,0 +1,87 @@
+"""Exports of models with every term, and motions to try them on; the parameters are those of some mechanism."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from davinci_forces.exports.identified import Export, ExportedJoint, ExportOrigin, OnlineFilter, Validity
+from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
+from davinci_forces.maths.models.coupled import CoupledArm
+from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.models.terms import OF_MOTION, TERMS, presliding_friction, smooth_sign, stribeck
+from davinci_forces.maths.uncertainty.error_band import Calibration
+from davinci_forces.records import Fit
+from davinci_forces.robots.models import coupled_arm, independent
+from davinci_forces.robots.robot import Robot
+
+RATE = 100.0
+ADDED = (
+    smooth_sign(0.1),
+    stribeck(0.2),
+    presliding_friction(2e-3, 1),
+    presliding_friction(2e-2, 2),
+    *OF_MOTION.values(),
+)
+ORIGIN = ExportOrigin(
+    "0.2.0", "0123456789abcdef" * 2, {"hand_roll": "good", "hand_pitch": "bad"}, ("joint hand_pitch is bad",)
+)
+
+
+def motion(n: int, N: int = 600, seed: int = 0) -> ArmMotion:
+    """A smooth motion of n joints, with reversals and a gap."""
+    random, t = np.random.default_rng(seed), np.arange(N)[:, None] / RATE
+    frequency, phase, size = random.uniform(0.5, 4.0, n), random.uniform(0, 6, n), random.uniform(0.1, 0.3, n)
+    w = frequency * np.array([[1.0], [2.0]])[:, None]
+    q, dq, ddq = (size * (a * np.sin(w * t + phase)).sum(axis=0) for a in (1 + 0 * w, w, -(w**2)))
+    dq = size * (w * np.cos(w * t + phase)).sum(axis=0)
+    return ArmMotion(q, dq, ddq, 1.0 / RATE, (np.arange(N) >= N // 2).astype(np.int64))
+
+
+def coupled(robot: Robot) -> CoupledArm:
+    """The model of all joints of a robot, with every friction."""
+    rows = range(len(robot.joints))
+    return coupled_arm(robot, rows, [ADDED] * len(rows))
+
+
+def possible(model, seed: int = 0) -> np.ndarray:
+    """Parameters that a mechanism can have."""
+    random, mechanism = np.random.default_rng(seed), model.mechanism
+    x = random.uniform(0.01, 0.2, mechanism.matrix.shape[1])
+    roots = random.normal(size=(mechanism.links, 4, 4)) * (0.1, 0.1, 0.1, 1.0)
+    if mechanism.links:
+        J = roots.swapaxes(1, 2) @ roots
+        x[: 10 * mechanism.links] = of_pseudo_inertias(J).ravel()
+    return mechanism.matrix @ x
+
+
+def fit_of(model, structure: str, theta: np.ndarray, estimator: str = "ridge") -> Fit:
+    """The record of a fit."""
+    parameters, m = model.parameters, len(model.efforts)
+    names, phi, unit = (np.array([getattr(p, key) for p in parameters], object) for key in ("name", "typst", "unit"))
+    scale, positive = np.array([p.scale for p in parameters]), np.array([float(p.positive) for p in parameters])
+    std = 0.1 * np.abs(theta)
+    return Fit(
+        group=model.group, model=model.name, estimator=estimator, structure=structure, cutoff=(10.0,) * m,
+        effort_lag=(0.0,) * m, logs=("one",), samples=1, periods=1, mse=0.0, r2=1.0, condition=1.0, correlated_lags=1,
+        parameter=names, phi=phi, unit=unit, scale=scale, positive=positive, theta=theta, theta_std=std,
+        theta_std_noise=std, theta_std_model=std, theta_std_classical=std,
+    )  # fmt: skip
+
+
+def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
+    """An export of all joints of a robot, as models of this structure with every term."""
+    study = SimpleNamespace(name="mine", title='A "title" -- */', robot=robot, simulated=simulated)
+    noise = NoiseModel(1e-4, 1e-3, 0.0, 2e-2, 3e-2)
+    band = Calibration(np.array([0.1, 0.3, 0.6]), np.array([0.9, 1.0, 1.2, 1.4]), 0.02, 0.1)
+    online, valid = OnlineFilter(RATE, noise, 0.7, band, 0.5), Validity((-2.0, 2.0), (-9.0, 9.0), (-50.0, 60.0))
+    joints = []
+    for number, joint in enumerate(robot.joints):
+        if structure == "coupled":
+            model = coupled(robot)
+        else:
+            terms = [term for term in TERMS.values() if term not in joint.terms]
+            model = independent(joint, [*terms, *ADDED])
+        fit = fit_of(model, structure, possible(model, 0 if structure == "coupled" else number))
+        joints.append(ExportedJoint(joint, fit, model, 10.0, 0.0, valid, online))
+    return Export(study, None, None, tuple(joints), ORIGIN)
