@@ -1,10 +1,12 @@
 """Real recordings of a da Vinci arm: what the pipeline must find on them, and must not claim."""
 
 import json
+import re
 import shutil
 
 import pytest
 
+from davinci_forces import robots
 from tests.conftest import ROOT
 from tests.test_runs import call
 
@@ -217,3 +219,26 @@ def test_what_a_log_that_ends_in_a_stop_says_of_the_joint_predicts_its_periods(u
 
 def test_verify_passes(dvrk):
     assert "are unchanged" in call("verify", dvrk)
+
+
+def test_the_arm_leaves_as_a_urdf_that_loads_and_says_what_it_lacks(dvrk, tmp_path):
+    call("export", dvrk, "--to", "urdf", "--out", tmp_path / "out")
+    arm = robots.load("arm.urdf", tmp_path / "out")
+    assert [joint.name for joint in arm.joints][:3] == list(JOINTS)
+    assert 0.5 < arm.bodies.masses.sum() < 100.0
+    table = (tmp_path / "out" / "arm.md").read_text()
+    shares = {m[1]: float(m[2]) for m in re.finditer(r"^\| (\w+ \| [\w ]+) \| .* \| ([\d.e-]+) % \|$", table, re.M)}
+    assert shares["instrument_slide | rotor inertia"] > 50.0  # the drive is heavier than the carriage
+    for joint in JOINTS:
+        [row] = re.findall(rf"^\| {joint} \| \S.* \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
+        effort, consistent, chosen = map(float, row)
+        assert chosen < consistent < 0.25 * effort
+
+
+def test_currents_do_not_become_a_urdf(ur10e, tmp_path):
+    said = call("export", ur10e[0], "--to", "urdf", "--out", tmp_path / "out", code=1)
+    [error] = [line for line in said.splitlines() if line.startswith("error: ")]
+    assert "a URDF needs effort in N m or N: that of" in error
+    assert "is in A; state torque_constant" in error
+    assert not (tmp_path / "out").exists()
+    call("export", ur10e[0], "--to", "json", "--out", tmp_path / "out")

@@ -3,19 +3,26 @@
 import json
 import re
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from davinci_forces import robots
 from davinci_forces.errors import BadRequest, BadRobot
-from davinci_forces.exports import FORMATS, renderer
+from davinci_forces.exports import FORMATS, renderer, urdf
 from davinci_forces.exports.identified import SAFETY, export_of
+from davinci_forces.maths.mechanics import rigid_body
+from davinci_forces.maths.mechanics.bodies import pseudo_inertias
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.records import Choice, JointModel
+from davinci_forces.records import Choice, JointModel, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.dvrk_psm import ROBOT as PSM
+from davinci_forces.robots.urdf import writing
+from tests import arm as tested_arm
+from tests import exported as exported_models
 from tests.exported import ORIGIN, RATE, export, motion
 
 
@@ -204,3 +211,115 @@ def test_the_json_is_as_its_schema_says(structure):
     next(iter(document["models"].values()))["parameters"][0].pop("std")
     assert mistakes(schema, document)
     assert set(document) - {"$schema"} == set(schema["properties"])
+
+
+def identified_arm(robot):
+    """A robot's arm with the consistent fit of some mechanism, and its motion and efforts."""
+    model = exported_models.coupled(robot)
+    fit = exported_models.fit_of(model, "coupled", exported_models.possible(model), "consistent")
+    moved = motion(len(robot.joints))
+    return urdf.completed_arm(robot, fit), moved, efforts(model, fit.theta, moved)
+
+
+def rigid_body_efforts(arm, moved):
+    return rigid_body.inverse_dynamics(arm.chain, arm.bodies, moved.q, moved.dq, moved.ddq)
+
+
+def beside_bodies(arm, moved):
+    """The efforts that the table lists beside the URDF, and its friction."""
+    tau = np.zeros_like(moved.q)
+    for about, _, value in arm.remainder:
+        tau[:, arm.model.joints.index(about.joint)] += urdf.remaining_effort(about, value, arm.model, moved)
+    for name, (viscous, coulomb) in arm.friction.items():
+        dq = moved.dq[:, arm.model.joints.index(name)]
+        tau[:, arm.model.joints.index(name)] += viscous * dq + coulomb * np.sign(dq)
+    return tau
+
+
+@pytest.mark.parametrize("robot", [DAVINCI, PSM], ids=["davinci", "psm"])
+def test_the_urdf_and_what_is_listed_beside_it_are_the_fit(robot):
+    arm, moved, tau = identified_arm(robot)
+    rigid = rigid_body_efforts(arm.robot, moved)
+    assert_allclose(rigid + beside_bodies(arm, moved), tau, rtol=0, atol=1e-8 * np.abs(tau).max())
+    J = pseudo_inertias(arm.inertial)
+    assert (np.linalg.eigvalsh(J)[:, 0] >= -1e-12).all()
+    assert (arm.inertial[:, 0] >= 0).all()
+
+
+@pytest.mark.parametrize("robot", [DAVINCI, PSM], ids=["davinci", "psm"])
+def test_the_urdf_reads_back_to_the_same_efforts_here_and_in_pinocchio(robot, tmp_path):
+    arm, moved, _ = identified_arm(robot)
+    rigid = rigid_body_efforts(arm.robot, moved)
+    text = writing.text(arm.robot, ["a -- b-"], arm.friction)
+    (tmp_path / "arm.urdf").write_text(text)
+    back = robots.load("arm.urdf", tmp_path)
+    assert_allclose(rigid_body_efforts(back, moved), rigid, rtol=0, atol=1e-9 * np.abs(rigid).max())
+    elements = ElementTree.fromstring(text)
+    for name, (viscous, coulomb) in arm.friction.items():
+        [dynamics] = elements.findall(f"joint[@name='{name}']/dynamics")
+        assert (float(dynamics.get("damping")), float(dynamics.get("friction"))) == (viscous, coulomb)
+    pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed: a rival of benchmarks, not a dependency")
+    model = pin.buildModelFromXML(text, mimic=True)
+    data, place = model.createData(), [model.joints[model.getJointId(j.name)] for j in robot.joints]
+    theirs = []
+    for row in zip(moved.q, moved.dq, moved.ddq, strict=True):
+        q, dq, ddq = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
+        for joint, x, v, a in zip(place, *row, strict=True):
+            q[joint.idx_q], dq[joint.idx_v], ddq[joint.idx_v] = x, v, a
+        theirs.append(pin.rnea(model, data, q, dq, ddq)[[joint.idx_v for joint in place]])
+    assert_allclose(theirs, rigid, rtol=0, atol=1e-9 * np.abs(rigid).max())
+
+
+def test_bodies_are_completed_by_those_nearest_to_the_robot_s_guesses():
+    model = exported_models.coupled(DAVINCI)
+    guess = DAVINCI.bodies.parameters(model.chain.n)
+    x = np.r_[guess, np.zeros(model.mechanism.matrix.shape[1] - len(guess))]
+    arm = urdf.completed_arm(
+        DAVINCI, exported_models.fit_of(model, "coupled", model.mechanism.matrix @ x, "consistent")
+    )
+    assert_allclose(arm.inertial.ravel(), guess, rtol=0, atol=1e-7)
+    light = urdf.completed_arm(replace(DAVINCI, bodies=None), arm.fit)
+    assert light.inertial[:, 0].sum() < 0.9 * guess[::10].sum()
+
+
+@pytest.fixture
+def together(lab, catalogue, monkeypatch):
+    """The export of an arm whose joints move together, with a fit of them."""
+    model = exported_models.coupled(lab.study.robot)
+    fit = exported_models.fit_of(model, "coupled", exported_models.possible(model), "consistent")
+    signals = [
+        tested_arm.signal(joint.name, period=5.0, periods=2, rate=50.0, log="arm") for joint in lab.study.robot.joints
+    ]
+    motions = [tested_arm.motion(signal) for signal in signals]
+    monkeypatch.setattr(urdf, "consistent_fit", lambda export: fit)
+    records = Catalogue(lambda kind: motions if kind is Motion else catalogue.records(kind))
+    return export_of(replace(lab.study, simulated=True), records, ORIGIN)
+
+
+def test_the_urdf_and_its_table_say_where_they_come_from_and_what_is_missing(together):
+    files = renderer("urdf")(together)
+    assert files == renderer("urdf")(together)
+    for text in files.values():
+        for line in (ORIGIN.report_id, ORIGIN.version, SAFETY, "SIMULATED", f"exported despite: {ORIGIN.despite[0]}"):
+            assert line in text
+    [table] = [text for name, text in files.items() if name.endswith(".md")]
+    for term in (
+        "| hand_roll | rotor inertia |",
+        "| hand_pitch | presliding friction 1 |",
+        "Stribeck",
+        "| chosen model |",
+    ):
+        assert term in table
+    assert "+1 m of" in table
+    ElementTree.fromstring(files["arm.urdf"])
+
+
+def test_a_urdf_needs_newtons_and_a_chain_and_a_log_of_the_whole_arm(small):
+    with pytest.raises(BadRequest, match="no identification log moves the joints together"):
+        renderer("urdf")(small)
+    with pytest.raises(BadRequest, match="whole arm; leave --joint out"):
+        renderer("urdf")(replace(small, joints=small.joints[:1]))
+    joints = tuple(replace(joint, joint=replace(joint.joint, effort="A")) for joint in small.joints)
+    bare = replace(small.study, robot=replace(small.study.robot, chain=None))
+    with pytest.raises(BadRequest, match=r"that of hand_roll.* is in A; state torque_constant; and the geometry"):
+        renderer("urdf")(replace(small, joints=joints, study=bare))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from davinci_forces.exports.identified import Renderer
 
-FORMATS = ("json",)
+FORMATS = ("json", "urdf")
 
 
 def renderer(name: str) -> "Renderer":

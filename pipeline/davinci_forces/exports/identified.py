@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadRequest
+from davinci_forces.files import visible
 from davinci_forces.filters import DEFAULT
 from davinci_forces.filters.error_bands import free_errors
 from davinci_forces.filters.problem import NoiseModel
@@ -128,18 +129,16 @@ class Export:
         lines += ["SIMULATED: the logs of this study are simulated"] * study.simulated
         lines += [SAFETY, *(f"exported despite: {reason}" for reason in origin.despite)]
         lines += ["SI units: rad, m, s, kg, N m, N; A where the effort is a motor current", "valid in the range of:"]
-        return [*lines, *(f"  {_range(joint)}" for joint in self.joints)]
+        return [visible(line) for line in (*lines, *(f"  {_range(joint)}" for joint in self.joints))]
 
-    def parameter_lines(self) -> list[str]:
-        """The parameters with their standard errors, a line each."""
-        lines = []
-        for name, fit in self.fits.items():
-            rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
-            lines += [f"parameters and standard errors of {name}:"]
-            lines += [
-                f"  {parameter}: {value:.6g} +- {std:.2g} {unit}".rstrip() for parameter, value, std, unit in rows
-            ]
-        return lines
+
+def parameter_lines(fit: Fit) -> list[str]:
+    """The parameters of a fit with their standard errors, a line each."""
+    rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
+    return [
+        "parameters and standard errors:",
+        *(f"  {p}: {x:.6g} +- {std:.2g} {unit}".rstrip() for p, x, std, unit in rows),
+    ]
 
 
 Renderer = Callable[[Export], dict[str, str]]  # the text of each file, by its name

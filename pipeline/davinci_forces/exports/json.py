@@ -17,23 +17,6 @@ from davinci_forces.maths.models.terms import Term
 from davinci_forces.records import Fit
 
 NAME, SCHEMA = "model.json", "model.schema.json"
-FORMULAS = {
-    "effort": "tau = sum of value * phi, over the parameters of a joint's model that name this joint or a link",
-    "motion": "q, dq and ddq pass a zero-phase low-pass at motion.cutoff [Hz], delayed by motion.effort_lag [s]",
-    "term": "phi = acceleration * ddq + sum of coefficient * function(q, dq), over its functions; z is its state",
-    "link": "phi is the effort of the chain if this inertial parameter is 1 and all others are 0: the efforts of all "
-    "links together are those of a chain whose links have these inertial parameters, and 0 for those not listed. "
-    "m [kg]; mx, my, mz first moments; Ixx .. Izz inertia about the origin of the link's frame, in its axes. A link "
-    "turns about (or slides along) z of its frame; its pose in its parent's frame is placement * Rz(q) (or Tz(q)). "
-    "Gravity acts against `up`, in the axes of the base",
-    "deflection": "z[0] = 0; z[k+1] = s - (s - z[k]) exp(-|dq[k]| T / displacement), s = sign(dq[k]), T = 1/rate",
-    "smooth sign": "z = tanh(dq / width)",
-    "Stribeck": "z = sign(dq) exp(-(dq / decay_velocity)^2)",
-    "function": "z is the function itself",
-    "filter": "extended Kalman filter of [q, dq, tau_ext] with steps of second order; R of the measured q and dq; Q "
-    "of a step, whose dq entry grows by (T F_C / M)^2 (1 - erf(dq / sqrt(2 P_dq))^2) for Coulomb friction F_C",
-    "band": "variance = factor^2 (P + model_variance), at least P; the factor of a range of |dq| between the edges",
-}
 
 
 def render(export: Export) -> dict[str, str]:
@@ -64,7 +47,6 @@ def document(export: Export) -> dict[str, Any]:
         "chain": _chain(chain.with_coordinates(len(robot.joints))) if chain else None,
         "models": {name: _model(export, name, fit) for name, fit in export.fits.items()},
         "joints": [_joint(joint, export.origin.verdicts.get(joint.name)) for joint in export.joints],
-        "formulas": FORMULAS,
     }
 
 

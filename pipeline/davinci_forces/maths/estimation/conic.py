@@ -10,12 +10,13 @@ moments without inertia, masses grow without limit; a higher price limits them, 
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.sparse import csc_array, diags_array, eye_array, hstack, vstack
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.estimation.least_squares import Triangle
-from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.models.model import Mechanism
 
 TEN = 10  # number of inertial parameters of a link, and of entries of a symmetric 4 x 4 matrix
@@ -29,6 +30,7 @@ AT_BOUND = 1e-8  # a value nearer to its bound than this share of the effort is 
 TOLERANCE = 1e-12  # of the solver's gaps and residuals
 MAX_STEP_FRACTION = 0.9  # a longer step towards the edge of a cone lets rounding stop the solver early
 MAX_GAP_SOLVER = 1e-8  # duality gap, as a share of the effort's square
+LENGTH = 0.1  # [m] size of the links of an arm for surgery, which compares moments of inertia with masses
 
 
 def settings(tolerance: float) -> Any:
@@ -175,3 +177,41 @@ def careful_settings() -> Any:
     cautious = settings(TOLERANCE)
     cautious.max_step_fraction = MAX_STEP_FRACTION
     return cautious
+
+
+def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | None) -> Array:
+    """Find a mechanism x (n,) that has these parameters: nearest to guessed links (10 L,), or of the least mass.
+
+    minimise |z - z_guess|^2, or the traces of all J, plus |price x|^2 of what is not a link,    A x = theta
+
+    z are the entries of every J in kg and `LENGTH`; `price` (n - 10 L,) makes x comparable with them.
+
+    Raises
+    ------
+    NotIdentifiable
+        If the solver does not converge.
+    """
+    import clarabel
+
+    L, n = mechanism.links, mechanism.matrix.shape[1]
+    links, scale = np.arange(n) < TEN * L, np.array([LENGTH] * 3 + [1.0])
+    B = block_diag(*[parameters_of_entries() * [scale[i] * scale[j] for i, j in ENTRIES]] * L, np.diag(1.0 / price))
+    F = mechanism.matrix @ B
+    size = np.linalg.norm(F, axis=1)
+    z_guess = np.zeros(n) if guess is None else np.linalg.solve(B, np.r_[guess, 0.0 * price])
+    trace = links & np.isin(np.arange(n) % TEN, DIAGONAL)
+    bounded = np.r_[: TEN * L, np.flatnonzero(mechanism.positive & ~links)]
+    rows = csc_array(np.vstack([F / size[:, None], -np.eye(n)[bounded]]))
+    kinds: list[Any] = [clarabel.ZeroConeT(len(F)), *[clarabel.PSDTriangleConeT(4)] * L]
+    kinds += [clarabel.NonnegativeConeT(len(bounded) - TEN * L)]
+    squares = diags_array(2.0 * (~links | (guess is not None)), format="csc")
+    cost, right = trace * 1.0 if guess is None else -2.0 * z_guess, np.r_[theta / size, np.zeros(len(bounded))]
+    z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, careful_settings()).solve().x)
+    miss = float(np.abs(F @ z - theta).max() / np.abs(theta).max())
+    if not miss < MAX_GAP_SOLVER:
+        raise NotIdentifiable(f"no links were found that have these parameters: they miss them by {miss:.1e}")
+    x = B @ np.where(mechanism.positive & ~links, np.maximum(z, 0.0), z)
+    J = pseudo_inertias(x[links].reshape(L, TEN)) / np.outer(scale, scale)
+    values, V = np.linalg.eigh(J)  # the solver's errors may leave values below 0
+    J = (V * np.maximum(values, 0.0)[:, None]) @ V.swapaxes(1, 2) * np.outer(scale, scale)
+    return np.concatenate([of_pseudo_inertias(J).ravel(), x[~links]])

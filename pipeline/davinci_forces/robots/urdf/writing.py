@@ -6,7 +6,7 @@ several links, the first joint is independent and the other joints mimic it.  UR
 acceleration, missing limits or drives.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
@@ -24,8 +24,8 @@ UPPER = np.triu_indices(3)
 FRAME_TOLERANCE = 1e-15  # largest rounding error of a frame that coincides with its link's frame
 
 
-def text(robot: Robot) -> str:
-    """The text of the robot's URDF.
+def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple[float, float]] | None = None) -> str:
+    """The text of the robot's URDF, with remarks at its head, and viscous and Coulomb friction by coordinate.
 
     Raises
     ------
@@ -34,14 +34,15 @@ def text(robot: Robot) -> str:
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
-    title = robot.title.replace("--", "- -").rstrip("-")  # an XML comment may not contain --
+    title, *remarks = (line.replace("--", "- -").rstrip("-") for line in (robot.title, *remarks))  # as XML demands
     weightless = "" if robot.bodies else "; the masses of its links are not known"
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {title}, in m, rad and kg, z up{weightless} -->",
+        *(f"<!-- {line} -->" for line in remarks),
         f"<robot name={quoteattr(robot.name)}>",
         f"  <link name={quoteattr(robot.chain.names[0])}/>",
-        *(f"  {line}" for line in _body(_turned(robot, robot.chain), robot.chain)),
+        *(f"  {line}" for line in _body(_turned(robot, robot.chain), robot.chain, friction or {})),
         "</robot>",
     ]
     return "\n".join(lines) + "\n"
@@ -72,12 +73,12 @@ def _turned(robot: Robot, chain: Chain) -> _Turned:
     )  # fmt: skip
 
 
-def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
+def _body(turned: _Turned, chain: Chain, friction: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     """The lines of all links and joints, and of the frames that are fixed to links."""
     moved = set[int]()
     for i, coordinate in enumerate(chain.coordinate.tolist()):
         yield from _link(turned, i)
-        yield from _joint(turned, chain, i, coordinate in moved)
+        yield from _joint(turned, chain, i, coordinate in moved, friction)
         moved.add(coordinate)
     taken = set(turned.links)
     for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
@@ -104,7 +105,9 @@ def _link(turned: _Turned, i: int) -> Iterator[str]:
     yield "</link>"
 
 
-def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]:
+def _joint(
+    turned: _Turned, chain: Chain, i: int, mimics: bool, friction: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
     """The lines of a link's joint: an independent joint, or a joint that mimics it."""
     robot, k = turned.robot, int(chain.coordinate[i])
     parent, child = turned.links[chain.parent[i]], turned.links[i + 1]
@@ -117,6 +120,9 @@ def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]
     yield from _origin(parent, child, turned.placement[i])
     yield f'  <axis xyz="{_numbers(turned.axis[i])}"/>'
     yield f"  <limit {_limits(limits, bounded or bool(chain.slides[i]))}/>"
+    if coordinate in friction and not mimics:
+        viscous, coulomb = map(_number, friction[coordinate])
+        yield f'  <dynamics damping="{viscous}" friction="{coulomb}"/>'
     if mimics:
         yield f'  <mimic joint={quoteattr(coordinate)} multiplier="1" offset="0"/>'
     yield "</joint>"
