@@ -4,18 +4,19 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from davinci_forces.exports.identified import Export, ExportedJoint, ExportOrigin, OnlineFilter, Validity
+from davinci_forces.exports.identified import Export, ExportedJoint, ExportOrigin
 from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.stepping import covariances
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, presliding_friction, smooth_sign, stribeck
-from davinci_forces.maths.uncertainty.error_band import Calibration
 from davinci_forces.records import Fit
 from davinci_forces.robots.models import coupled_arm, independent
 from davinci_forces.robots.robot import Robot
 
 RATE = 100.0
+NOISE = NoiseModel(1e-4, 1e-3, 0.0, 2e-2, 3e-2)
 ADDED = (
     smooth_sign(0.1),
     stribeck(0.2),
@@ -72,9 +73,11 @@ def fit_of(model, structure: str, theta: np.ndarray, estimator: str = "ridge") -
 def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
     """An export of all joints of a robot, as models of this structure with every term."""
     study = SimpleNamespace(name="mine", title='A "title" -- */', robot=robot, simulated=simulated)
-    noise = NoiseModel(1e-4, 1e-3, 0.0, 2e-2, 3e-2)
-    band = Calibration(np.array([0.1, 0.3, 0.6]), np.array([0.9, 1.0, 1.2, 1.4]), 0.02, 0.1)
-    online, valid = OnlineFilter(RATE, noise, 0.7, band, 0.5), Validity((-2.0, 2.0), (-9.0, 9.0), (-50.0, 60.0))
+    R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1.0 / RATE)
+    band = {"edges": [0.1, 0.3, 0.6], "factor": [0.9, 1.0, 1.2, 1.4], "model_variance": 0.02}
+    Q = [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]]
+    online = {"rate": RATE, "R": [R_q, R_dq], "Q": Q, "initial_std": 0.7, "band": band, "alarm_level": 0.02}
+    valid = {"position": [-2.0, 2.0], "velocity": [-9.0, 9.0], "effort": [-50.0, 60.0]}
     joints = []
     for number, joint in enumerate(robot.joints):
         if structure == "coupled":
@@ -83,5 +86,13 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
             terms = [term for term in TERMS.values() if term not in joint.terms]
             model = independent(joint, [*terms, *ADDED])
         fit = fit_of(model, structure, possible(model, 0 if structure == "coupled" else number))
-        joints.append(ExportedJoint(joint, fit, model, 10.0, 0.0, valid, online))
+        joints.append(ExportedJoint(joint.name, joint, fit, model, valid, online))
     return Export(study, None, None, tuple(joints), ORIGIN)
+
+
+def motion_of(joint: ExportedJoint, moved: ArmMotion) -> ArmMotion:
+    """The motion of a joint's model, from that of all joints of the arm."""
+    columns = [
+        i for i, name in enumerate(("hand_roll", "hand_pitch", "instrument_slide")) if name in joint.model.joints
+    ]
+    return moved._replace(**{x: getattr(moved, x)[:, columns] for x in ("q", "dq", "ddq")})

@@ -58,9 +58,9 @@ def test_the_range_of_validity_is_that_of_logs_without_contact(small, catalogue)
     [roll] = [joint for joint in small.joints if joint.name == "hand_roll"]
     contact = [m for m in catalogue.select(JointModel, joint="hand_roll") if m.role == "contact"]
     assert contact
-    assert max(np.abs(m.tau).max() for m in contact) > roll.validity.largest_effort
+    assert max(np.abs(m.tau).max() for m in contact) > max(map(abs, roll.validity["effort"]))
     free = [m for m in catalogue.select(JointModel, joint="hand_roll") if m.role in ("identification", "validation")]
-    assert roll.validity.q == (min(m.q_measured.min() for m in free), max(m.q_measured.max() for m in free))
+    assert roll.validity["position"] == [min(m.q_measured.min() for m in free), max(m.q_measured.max() for m in free)]
 
 
 # A stranger's program: it knows the file, and nothing of this package.
@@ -319,7 +319,7 @@ def test_a_urdf_needs_newtons_and_a_chain_and_a_log_of_the_whole_arm(small):
         renderer("urdf")(small)
     with pytest.raises(BadRequest, match="whole arm; leave --joint out"):
         renderer("urdf")(replace(small, joints=small.joints[:1]))
-    joints = tuple(replace(joint, joint=replace(joint.joint, effort="A")) for joint in small.joints)
+    joints = tuple(joint._replace(joint=replace(joint.joint, effort="A")) for joint in small.joints)
     bare = replace(small.study, robot=replace(small.study.robot, chain=None))
     with pytest.raises(BadRequest, match=r"that of hand_roll.* is in A; state torque_constant; and the geometry"):
         renderer("urdf")(replace(small, joints=joints, study=bare))

@@ -1,15 +1,13 @@
 """Formats in which an identified model leaves for an arm: one module each, exporting `render`, listed below."""
 
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from davinci_forces.exports.identified import Renderer
-
-FORMATS = ("json", "urdf")
+FORMATS = ("json", "urdf", "c")
 
 
-def renderer(name: str) -> "Renderer":
-    """Return the function that renders a format."""
-    render: Renderer = import_module(f"davinci_forces.exports.{name}").render
+def renderer(name: str) -> Callable[[Any], dict[str, str]]:
+    """Return the function that renders an `identified.Export` in a format: the text of each file, by its name."""
+    render: Callable[[Any], dict[str, str]] = import_module(f"davinci_forces.exports.{name}").render
     return render

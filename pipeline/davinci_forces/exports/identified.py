@@ -1,8 +1,9 @@
-"""What is exported of a study: the model of each joint with its errors, noise and validity, and the head of a file."""
+"""What is exported of a study: the model of each joint with errors, noise and validity, and the head of each file."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,16 +11,18 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.files import visible
 from davinci_forces.filters import DEFAULT
 from davinci_forces.filters.error_bands import free_errors
-from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import noise_model
+from davinci_forces.filters.stepping import covariances
 from davinci_forces.identification.used import Identified
+from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
+from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
-from davinci_forces.maths.uncertainty.error_band import Calibration, calibrate
+from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.prediction import CHOSEN
@@ -29,8 +32,8 @@ from davinci_forces.study import Study
 SAFETY = "research use, not a medical device; try at reduced effort with the stop in hand"
 FREE_ROLES = ("identification", "validation")  # of logs without contact, whose motion and effort bound the validity
 DRIVE = (inertia, stiffness, offset)  # terms of a coupled joint's drive and cables, in the order of `coupled.ADDED`
-STATIC_FUNCTIONS = ("1", "sin q", "cos q", "q")
-STATIC_STATES = ("q^2", "q^3", "sin 2q", "cos 2q", "sin 3q", "cos 3q")  # functions of z that hold a resting arm
+STATIC = {"1", "sin q", "cos q", "q", "q^2", "q^3", "sin 2q", "cos 2q", "sin 3q", "cos 3q"}  # hold a resting arm
+UNITS = {"position": "{position}", "velocity": "{position}/s", "effort": "{effort}"}
 
 
 class ExportOrigin(NamedTuple):
@@ -42,29 +45,6 @@ class ExportOrigin(NamedTuple):
     despite: tuple[str, ...] = ()
 
 
-class Validity(NamedTuple):
-    """Ranges of position, velocity and effort in the logs of free motion, in the joint's units."""
-
-    q: tuple[float, float]
-    dq: tuple[float, float]
-    tau: tuple[float, float]
-
-    @property
-    def largest_effort(self) -> float:
-        """The largest effort recorded, in either direction."""
-        return max(map(abs, self.tau))
-
-
-class OnlineFilter(NamedTuple):
-    """The default filter of a joint, its error band and its alarm level; None where free motion does not give them."""
-
-    rate: float  # [Hz]
-    noise: NoiseModel
-    initial_std: float
-    band: Calibration | None
-    alarm: float | None
-
-
 class ModelTerm(NamedTuple):
     """What a parameter multiplies: an inertial parameter of a link, or a term in the effort of one joint."""
 
@@ -73,38 +53,16 @@ class ModelTerm(NamedTuple):
     link: str = ""
     inertial: str = ""
 
-    @property
-    def role(self) -> str:
-        """The kind of effort: link, inertia, gravity (all that holds a resting arm) or friction."""
-        if self.term is None:
-            return "link"
-        if self.term.a:
-            return "inertia"
-        static = set(self.term.b) <= set(STATIC_FUNCTIONS) or self.term.of_motion in STATIC_STATES
-        return "gravity" if static else "friction"
 
+class ExportedJoint(NamedTuple):
+    """A joint with the fit of its effort, the ranges of its free motion, and its filter as JSON values."""
 
-@dataclass(frozen=True)
-class ExportedJoint:
-    """A joint with the fit that describes its effort."""
-
+    name: str
     joint: Joint
     fit: Fit
     model: Model
-    cutoff: float  # [Hz] of the low-pass of the motion
-    effort_lag: float  # [s]
-    validity: Validity
-    filter: OnlineFilter | None
-
-    @property
-    def name(self) -> str:
-        """The joint's name."""
-        return self.joint.name
-
-    @property
-    def fit_name(self) -> str:
-        """The key of its fit."""
-        return ".".join(self.fit.key)
+    validity: dict[str, list[float]]
+    filter: dict[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -118,36 +76,40 @@ class Export:
     origin: ExportOrigin
 
     @property
-    def fits(self) -> dict[str, Fit]:
-        """The fits of the joints, each once, by key."""
-        return {joint.fit_name: joint.fit for joint in self.joints}
+    def fits(self) -> dict[str, tuple[Fit, Model]]:
+        """The fits of the joints with their models, each once, by key."""
+        return {".".join(joint.fit.key): (joint.fit, joint.model) for joint in self.joints}
 
-    def head(self) -> list[str]:
-        """The lines at the head of every file: origin, safety, ranges of validity, parameters with standard errors."""
+    def head(self, *fits: Fit) -> list[str]:
+        """The lines at the head of every file: origin, safety, ranges, and the parameters of fits with their errors."""
         origin, study = self.origin, self.study
         lines = [f"davinci-forces {origin.version}, report ID {origin.report_id}", f"study {study.name}: {study.title}"]
         lines += ["SIMULATED: the logs of this study are simulated"] * study.simulated
         lines += [SAFETY, *(f"exported despite: {reason}" for reason in origin.despite)]
         lines += ["SI units: rad, m, s, kg, N m, N; A where the effort is a motor current", "valid in the range of:"]
-        return [visible(line) for line in (*lines, *(f"  {_range(joint)}" for joint in self.joints))]
+        for joint in self.joints:
+            units = (joint.joint.unit(unit) for unit in UNITS.values())
+            ranges = zip(UNITS, joint.validity.values(), units, strict=True)
+            text = ", ".join(f"{name} {low:.5g} to {high:.5g} {unit}" for name, (low, high), unit in ranges)
+            lines.append(f"  {joint.name}: {text}")
+        for fit in fits:
+            rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
+            lines.append(f"parameters of {'.'.join(fit.key)}, with standard errors:")
+            lines += [f"  {name}: {value:.6g} +- {std:.2g} {unit}".rstrip() for name, value, std, unit in rows]
+        return [visible(line) for line in lines]
 
-
-def parameter_lines(fit: Fit) -> list[str]:
-    """The parameters of a fit with their standard errors, a line each."""
-    rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
-    return [
-        "parameters and standard errors:",
-        *(f"  {p}: {x:.6g} +- {std:.2g} {unit}".rstrip() for p, x, std, unit in rows),
-    ]
-
-
-Renderer = Callable[[Export], dict[str, str]]  # the text of each file, by its name
-
-
-def _range(joint: ExportedJoint) -> str:
-    columns = zip(joint.validity, ("{position}", "{position}/s", "{effort}"), ("q", "dq", "tau"), strict=True)
-    ranges = (f"{name} {low:.5g} to {high:.5g} {joint.joint.unit(unit)}" for (low, high), unit, name in columns)
-    return f"{joint.name}: {', '.join(ranges)}"
+    def document(self) -> dict[str, Any]:
+        """The model as JSON values."""
+        robot, origin = self.study.robot, self.origin
+        coupled = any(isinstance(model, CoupledArm) for _, model in self.fits.values())
+        return {
+            "head": self.head(), "report_id": origin.report_id, "version": origin.version, "robot": robot.name,
+            "simulated": self.study.simulated, "despite_verdict": list(origin.despite),
+            "coordinates": [joint.name for joint in robot.joints], "gravity": GRAVITY,
+            "chain": _chain(robot.chain.with_coordinates(len(robot.joints))) if robot.chain and coupled else None,
+            "models": {name: _model(*fit) for name, fit in self.fits.items()},
+            "joints": [_joint(joint, origin.verdicts.get(joint.name)) for joint in self.joints],
+        }  # fmt: skip
 
 
 def terms_of(model: Model) -> list[ModelTerm]:
@@ -155,15 +117,59 @@ def terms_of(model: Model) -> list[ModelTerm]:
     if isinstance(model, IndependentJoint):
         return [ModelTerm(model.group, term) for term in model.terms]
     assert isinstance(model, CoupledArm)
-    links, terms = model.chain.links, []
-    for column in model.base.columns.tolist():
-        if column < 10 * len(links):
-            terms.append(ModelTerm("", None, links[column // 10], PARAMETERS[column % 10]))
-        else:
-            which, row = divmod(column - 10 * len(links), len(model.rows))
-            terms.append(ModelTerm(model.efforts[row], DRIVE[which]))
+    names = [ModelTerm("", None, link, which) for link in model.chain.links for which in PARAMETERS]
+    names += [ModelTerm(joint, term) for term in DRIVE for joint in model.efforts]
     pairs = zip(model.efforts, model.friction, strict=True)
-    return [*terms, *(ModelTerm(joint, term) for joint, friction in pairs for term in friction)]
+    frictions = (ModelTerm(joint, term) for joint, terms in pairs for term in terms)
+    return [*(names[column] for column in model.base.columns.tolist()), *frictions]
+
+
+def _chain(chain: Chain) -> dict[str, Any]:
+    columns = (chain.links, chain.parent.tolist(), chain.coordinate.tolist(), chain.slides.tolist())
+    links = [
+        {"name": name, "parent": parent - 1 if parent else None, "coordinate": None if k == FIXED else k,
+         "prismatic": slides, "placement": T}
+        for name, parent, k, slides, T in zip(*columns, chain.placement.tolist(), strict=True)
+    ]  # fmt: skip
+    return {"up": list(chain.up), "links": links}
+
+
+def _model(fit: Fit, model: Model) -> dict[str, Any]:
+    rows = zip(fit.parameter, fit.theta.tolist(), map(_finite, fit.theta_std.tolist()), fit.unit, strict=True)
+    parameters = [
+        {"name": str(name), "joint": about.joint or None, "value": value, "std": std, "unit": str(unit)}
+        | (_term(about.term) if about.term else {"role": "link", "link": about.link, "inertial": about.inertial})
+        for about, (name, value, std, unit) in zip(terms_of(model), rows, strict=True)
+    ]
+    about = {"structure": fit.structure, "efforts": list(model.efforts), "logs": list(fit.logs), "mse": fit.mse}
+    return {**about, "parameters": parameters}
+
+
+def _term(term: Term) -> dict[str, Any]:
+    kinds = {"deflection": "displacement", "smooth sign": "width", "Stribeck": "decay_velocity"}
+    states = [{"kind": kind, name: getattr(term, name)} for kind, name in kinds.items() if getattr(term, name)]
+    states += [{"kind": "function", "function": term.of_motion}] * bool(term.of_motion)
+    functions = {term.of_motion} if term.of_motion else set(term.b)
+    role = "inertia" if term.a else "gravity" if functions <= STATIC else "friction"
+    return {"role": role, "acceleration": term.a, "functions": dict(term.b), "state": next(iter(states), None)}
+
+
+def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
+    limits, i = joint.joint.limits, joint.model.efforts.index(joint.name)
+    ends = zip(UNITS, (limits.q, limits.dq, (-limits.effort, limits.effort)), strict=True)
+    return {
+        "name": joint.name, "title": joint.joint.title, "kind": joint.joint.kind.value, "verdict": verdict,
+        "units": {name: joint.joint.unit(unit) for name, unit in UNITS.items()},
+        "gear_ratio": joint.joint.gear_ratio, "torque_constant": joint.joint.torque_constant,
+        "limits": {name: [_finite(low), _finite(high)] for name, (low, high) in ends},
+        "model": ".".join(joint.fit.key),
+        "motion": {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]},
+        "validity": joint.validity, "filter": joint.filter,
+    }  # fmt: skip
+
+
+def _finite(x: float) -> float | None:
+    return x if isfinite(x) else None
 
 
 def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: Sequence[str] = ()) -> Export:
@@ -179,30 +185,33 @@ def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: S
     identified = Identified(study.robot, [*catalogue.records(Fit), *catalogue.records(Choice)])
     if study.settings.fit == CHOSEN and not catalogue.records(Choice):
         raise BadRequest(f"{study.name}: no model was chosen, so there is nothing to export; the report says why")
-    joints = [study.robot.joint(name) for name in names] or study.robot.joints
-    fits = {joint.name: identified.fit_of(joint.name, study.settings.fit) for joint in joints}
-    if missing := [name for name, fit in fits.items() if fit is None and (names or not any(fits.values()))]:
-        raise BadRequest(f"{study.name}: joint {missing[0]} has no model, since no identification log moves it")
-    models = (_joint(study, catalogue, identified, joint, fit) for joint in joints if (fit := fits[joint.name]))
-    return Export(study, catalogue, identified, tuple(models), origin)
+    joints = []
+    for joint in [study.robot.joint(name) for name in names] or study.robot.joints:
+        if fit := identified.fit_of(joint.name, study.settings.fit):
+            free = [m for m in catalogue.select(Motion, joint=joint.name) if m.role in FREE_ROLES]
+            columns = (np.concatenate([getattr(m, name) for m in free]) for name in ("q_measured", "dq", "tau"))
+            ranges = ([float(x.min()), float(x.max())] for x in columns)
+            validity, online = dict(zip(UNITS, ranges, strict=True)), _filter(study, catalogue, joint, free)
+            joints.append(ExportedJoint(joint.name, joint, fit, identified.model(fit), validity, online))
+        elif names:
+            raise BadRequest(f"{study.name}: joint {joint.name} has no model, since no identification log moves it")
+    return Export(study, catalogue, identified, tuple(joints), origin)
 
 
-def _joint(study: Study, catalogue: Catalogue, identified: Identified, joint: Joint, fit: Fit) -> ExportedJoint:
-    free = [motion for motion in catalogue.select(Motion, joint=joint.name) if motion.role in FREE_ROLES]
-    columns = ([getattr(motion, name) for motion in free] for name in ("q_measured", "dq", "tau"))
-    ranges = ((min(float(x.min()) for x in xs), max(float(x.max()) for x in xs)) for xs in columns)
-    tau_std = float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest]))
-    processing = identified.cutoff_and_lag(fit, joint.name)
-    online = _filter(study, catalogue, joint, tau_std)
-    return ExportedJoint(joint, fit, identified.model(fit), *processing, Validity(*ranges), online)
-
-
-def _filter(study: Study, catalogue: Catalogue, joint: Joint, initial_std: float) -> OnlineFilter | None:
+def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Motion]) -> dict[str, Any] | None:
+    """The default filter of a joint with its band and its alarm level, as far as free motion gives them."""
     for tuned in catalogue.select(FilterNoise, joint=joint.name):
         noise = noise_model(tuned, joint, 1.0 / tuned.rate, study.settings.q_tau)
+        R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, 1.0 / tuned.rate)
         bands = [calibrate(free_errors(band, False)) for band in catalogue.select(ErrorBand, joint=joint.name)]
         spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
         unfitted = [space for space in spaces if space.role != "identification"] or spaces
         levels = [alarm_level([FreeMotionStatistics(s.free_rms, s.free_max, s.crossings)]) for s in unfitted]
-        return OnlineFilter(tuned.rate, noise, initial_std, next(iter(bands), None), max(levels, default=None))
+        return {
+            "rate": tuned.rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],
+            "initial_std": float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest])),
+            "band": next(({"edges": b.edges.tolist(), "factor": b.factor.tolist(), "model_variance": b.model_variance}
+                          for b in bands), None),
+            "alarm_level": max(levels, default=None),
+        }  # fmt: skip
     return None

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, parameter_lines, terms_of
+from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, terms_of
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
@@ -64,9 +64,9 @@ def render(export: Export) -> dict[str, str]:
     if missing:
         raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json does not")
     arm = completed_arm(robot, consistent_fit(export))
-    head = [*export.head(), f"bodies and friction: {'.'.join(arm.fit.key)}; {TABLE} says what a URDF does not hold"]
-    urdf = writing.text(arm.robot, [*head, *parameter_lines(arm.fit)], arm.friction)
-    return {"arm.urdf": urdf, TABLE: "\n".join([*head, *_tables(export, arm)]) + "\n"}
+    note = [f"bodies and friction: {'.'.join(arm.fit.key)}; {TABLE} says what a URDF does not hold"]
+    urdf = writing.text(arm.robot, export.head(arm.fit) + note, arm.friction)
+    return {"arm.urdf": urdf, TABLE: "\n".join([*export.head(), *note, *_tables(export, arm)]) + "\n"}
 
 
 def consistent_fit(export: Export) -> Fit:

@@ -61,7 +61,7 @@ def objections(study: Study, model: Export) -> tuple[str, ...]:
     bad = [
         f"joint {j.name} has the verdict Problem" for j in model.joints if model.origin.verdicts.get(j.name) == "bad"
     ]
-    used = {STUDY: {""}, "run": {log for fit in model.fits.values() for log in fit.logs}}
+    used = {STUDY: {""}, "run": {log for fit, _ in model.fits.values() for log in fit.logs}}
     rejected = [
         f"{' '.join([r.subject, r.name]).strip()} is rejected by {r.reviewer or 'a reviewer'}"
         for r in reporting.ratings(study)

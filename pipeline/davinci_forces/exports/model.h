@@ -1,0 +1,31 @@
+/*
+@HEAD@
+ *
+ * C99 and C++, no allocation, doubles in the joints' units.  Every q, dq and ddq has the DF_COORDINATES coordinates
+ * @COORDINATES@; a joint of a coupled arm needs all of them.  They pass a low-pass and are
+ * delayed as `joints` below says: the standard deviation leaves out what that delay costs.
+ * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
+ * one standard error, never along the motion.  Both are limited to the largest effort recorded.
+@PROCESSING@
+ */
+#ifndef DAVINCI_FORCES_MODEL_H
+#define DAVINCI_FORCES_MODEL_H
+#ifdef __cplusplus
+extern "C" {
+#endif
+enum { DF_COORDINATES = @N@, DF_STATES = @STATES@ };
+enum { @JOINTS@, DF_JOINTS };
+typedef enum { DF_OK, DF_OUTSIDE_VALIDITY, DF_BAD_INPUT } df_status; /* bad input leaves everything as it was */
+typedef struct { int runs; double t, z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
+typedef struct { double t, tau, q_measured, dq_measured, q[DF_COORDINATES], dq[DF_COORDINATES], ddq[DF_COORDINATES]; } df_sample;
+typedef struct { double tau_hat, tau_ext, std_filter, std; int contact; } df_result; /* contact: -1 where no level is known */
+df_status df_inertia(int joint, const double *q, double *inertia);
+df_status df_bias(int joint, const df_state *s, const double *q, const double *dq, double *tau);
+df_status df_gravity(int joint, const double *q, double *tau);
+df_status df_friction(int joint, const df_state *s, const double *q, const double *dq, double *tau);
+df_status df_effort(int joint, const df_state *s, const double *q, const double *dq, const double *ddq, double *tau);
+df_status df_step(int joint, df_state *s, const df_sample *sample, df_result *result); /* a gap restarts the filter */
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,139 @@
+"""The model in C gives the numbers of the model in Python, and refuses what it must not use."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.exports import renderer
+from davinci_forces.filters import ekf
+from davinci_forces.filters.problem import FilterInput
+from davinci_forces.maths.models.memory import efforts
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
+from davinci_forces.robots.dvrk_psm import ROBOT as PSM
+from tests.compiled_model import BAD, OK, OUTSIDE, CompiledModel
+from tests.exported import NOISE, RATE, export, motion, motion_of
+
+ROBOTS = {"davinci": DAVINCI, "psm": PSM, "tilted": DAVINCI.with_base((0.3, -0.7, 0.2))}
+
+
+@pytest.fixture(
+    scope="module", params=[(name, kind) for name in ROBOTS for kind in ("independent", "coupled")], ids="-".join
+)
+def model(request, tmp_path_factory):
+    given = export(ROBOTS[request.param[0]], request.param[1])
+    return given, CompiledModel(renderer("c")(given), tmp_path_factory.mktemp("c"))
+
+
+def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
+    given, compiled = model
+    moved, random = motion(len(given.joints)), np.random.default_rng(1)
+    N, halves = len(moved.q), np.flatnonzero(np.diff(moved.segment)) + 1
+    t = np.arange(N) / RATE + 0.5 * (moved.segment > 0)
+    for i, joint in enumerate(given.joints):
+        of_joint, row = motion_of(joint, moved), joint.model.efforts.index(joint.name)
+        tau_hat = efforts(joint.model, joint.fit.theta, of_joint)[:, row]
+        q, dq = (x[:, i] + s * random.normal(size=N) for x, s in ((moved.q, 1e-4), (moved.dq, 1e-3)))
+        tau = tau_hat + 0.1 * random.normal(size=N) + (t > 2.0)
+        dynamics = joint.model.joint_dynamics(joint.fit.theta, of_joint)[row]
+        whole = FilterInput(dynamics, q, dq, moved.ddq[:, i], tau, 1.0 / RATE, 0.7)
+        parts = [whole.part(slice(0, halves[0])), whole.part(slice(halves[0], N))]
+        expected = np.concatenate(
+            [[x.tau_ext, x.tau_ext_std] for x in (ekf.track(part, NOISE) for part in parts)], axis=1
+        )
+        compiled.restart()
+        rows = []
+        for k in range(N):
+            status = compiled.step(i, t[k], tau[k], q[k], dq[k], moved.q[k], moved.dq[k], moved.ddq[k])
+            assert status in (OK, OUTSIDE)
+            r = compiled.result
+            rows.append((r.tau_hat, r.tau_ext, r.std_filter, r.std, r.contact))
+        hat, tau_ext, std_filter, std, contact = np.array(rows).T
+        assert_allclose(hat, tau_hat, rtol=0, atol=1e-12 * np.abs(tau_hat).max())
+        assert_allclose(tau_ext, expected[0], rtol=0, atol=1e-12 * np.abs(tau).max())
+        assert_allclose(std_filter, expected[1], rtol=1e-12)
+        band, speed = joint.filter["band"], np.searchsorted([0.1, 0.3, 0.6], np.abs(moved.dq[:, i]))
+        total = np.array(band["factor"])[speed] * np.sqrt(std_filter**2 + band["model_variance"])
+        assert_allclose(std, np.maximum(std_filter, total), rtol=1e-12)
+        assert (contact == (np.abs(tau_ext) > 0.02)).all()
+        assert contact.any()
+
+
+def test_inertia_bias_and_gravity_are_those_of_the_model(model):
+    given, compiled = model
+    moved = motion(len(given.joints), N=40)
+    compiled.restart()
+    for i, joint in enumerate(given.joints):
+        row, theta = joint.model.efforts.index(joint.name), joint.fit.theta
+        for k in range(len(moved.q)):
+            [q], [dq], [ddq] = (x[k : k + 1] for x in moved[:3])
+            alone = motion_of(
+                joint, moved._replace(**{x: getattr(moved, x)[k : k + 1] for x in ("q", "dq", "ddq", "segment")})
+            )
+            still = alone._replace(dq=0 * alone.dq, ddq=0 * alone.ddq)
+            M, b = joint.model.inertia(theta, alone.q)[0, row, row], joint.model.bias(theta, alone)[0, row]
+            tau, G = (efforts(joint.model, theta, x)[0, row] for x in (alone, still))
+            size = 1e-12 * max(abs(tau), abs(b), abs(M), 1.0)
+            assert compiled.call("inertia", i, q)[1] == pytest.approx(M, abs=size)
+            assert compiled.call("bias", i, q, dq, state=True)[1] == pytest.approx(b, abs=size)
+            assert compiled.call("effort", i, q, dq, ddq, state=True)[1] == pytest.approx(tau, abs=size)
+            assert compiled.call("gravity", i, q)[1] == pytest.approx(np.clip(G, -60.0, 60.0), abs=size)
+
+
+def test_friction_for_compensation_is_less_than_the_model_s_and_never_drives(model):
+    given, compiled = model
+    moved, lower = motion(len(given.joints)), 0
+    for i, joint in enumerate(given.joints):
+        compiled.restart()
+        zero = np.zeros(len(given.joints))
+        for k in range(0, len(moved.q), 7):
+            compiled.step(i, k / RATE, 0.0, moved.q[k, i], moved.dq[k, i], *(x[k] for x in moved[:3]))
+            q, dq = moved.q[k], moved.dq[k]
+            friction = compiled.call("bias", i, q, dq, state=True)[1] - compiled.call("gravity", i, q)[1]
+            compensation = compiled.call("friction", i, q, dq, state=True)[1]
+            assert compensation * dq[i] >= 0.0
+            if joint.fit.structure == "independent":  # else the bias has Coriolis efforts, too
+                least = max(np.sign(dq[i]) * friction, 0.0)
+                assert abs(compensation) <= 0.9 * least + 1e-12
+                lower += abs(compensation) > 0.0
+        assert compiled.call("friction", i, q, zero, state=True) == (OK, 0.0)
+    assert lower or given.joints[0].fit.structure == "coupled"
+
+
+def test_gravity_and_friction_are_limited_to_the_largest_effort_recorded(tmp_path):
+    given = export(DAVINCI, "independent")
+    small = {**given.joints[0].validity, "effort": [-0.02, 0.01]}
+    tiny = replace(given, joints=tuple(j._replace(validity=small) for j in given.joints))
+    compiled = CompiledModel(renderer("c")(tiny), tmp_path)
+    for q in (0.5, -1.5):
+        assert abs(compiled.call("gravity", 0, (q, 0, 0))[1]) == 0.02
+    assert compiled.call("friction", 0, (0.5, 0, 0), (1.0, 0, 0), state=True)[1] == 0.02
+
+
+def test_bad_input_changes_nothing_and_a_gap_restarts(model):
+    given, compiled = model
+    zero = [0.0] * len(given.joints)
+    good = (0.0, 0.1, 0.2, zero, zero, zero)
+    compiled.restart()
+    assert compiled.step(0, 0.00, *good) == OK
+    assert compiled.step(0, 0.01, *good) == OK
+    before, result = bytes(compiled.state), bytes(compiled.result)
+    bad = [(t, *good) for t in (0.01, 0.0, np.nan, np.inf)]
+    for place in (1, 2, 3):
+        bad += [(0.02, *(wrong if place == k else x for k, x in enumerate(good, 1))) for wrong in (np.nan, -np.inf)]
+    bad += [(0.02, *good[:3], *([np.nan, 0, 0] if k == j else zero for k in range(3))) for j in range(3)]
+    for sample in bad:
+        assert compiled.step(0, *sample) == BAD, sample
+        assert (bytes(compiled.state), bytes(compiled.result)) == (before, result)
+    for joint in (-1, len(given.joints)):
+        assert compiled.step(joint, 0.02, *good) == BAD
+        assert compiled.call("gravity", joint, zero)[0] == BAD
+    assert compiled.step(0, 0.02, *good) == OK
+    fast = [[9.5, 0, 0] if k == 1 else zero for k in range(3)]
+    assert compiled.step(0, 0.03, *good[:3], *fast) == OUTSIDE
+    assert compiled.step(0, 0.04, 61.0, *good[1:]) == OUTSIDE
+    uncertain = compiled.result.std_filter
+    assert compiled.step(0, 0.10, *good) == OK
+    assert compiled.result.std_filter == pytest.approx(0.7) != uncertain
+    assert np.isnan(compiled.call("gravity", 0, [np.nan, 0, 0])[1])
