@@ -9,7 +9,7 @@ import pytest
 from davinci_forces.errors import NotAFile
 from davinci_forces.exports import FORMATS
 from davinci_forces.files import write_folder
-from davinci_forces.runner import exporting
+from davinci_forces.runner.results import campaign
 from davinci_forces.study.review import FILE
 from tests.test_cli import call
 
@@ -45,7 +45,7 @@ def test_a_folder_that_holds_anything_of_somebody_is_not_replaced(tmp_path):
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / "thesis.tex").write_text("work of years")
-    with pytest.raises(NotAFile, match=r"holds 'thesis\.tex', which is not of this export"):
+    with pytest.raises(NotAFile, match=r"it exists, and holds 'thesis\.tex'"):
         write_folder(folder, {"model.json": b"{}"}, True)
     link = tmp_path / "link"
     link.symlink_to(folder)
@@ -95,7 +95,7 @@ def test_a_rejected_study_leaves_only_if_asked_twice_and_its_files_say_so(finish
 
 def test_a_problem_on_page_one_forbids_only_the_joint_that_has_it(finished, tmp_path, monkeypatch):
     joints = [{"joint": "hand_roll", "verdict": "bad"}, {"joint": "instrument_slide", "verdict": "good"}]
-    monkeypatch.setattr(exporting, "read_summary", lambda file: {"joints": joints})
+    monkeypatch.setattr(campaign, "read_summary", lambda file: {"joints": joints})
     message = one_message(call("export", finished, "--to", "json", "--out", tmp_path / "out", code=1))
     assert "joint hand_roll has the verdict Problem" in message
     call("export", finished, "--to", "json", "--out", tmp_path / "out", "--joint", "instrument_slide")

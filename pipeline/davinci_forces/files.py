@@ -122,15 +122,14 @@ def write_folder(folder: Path, contents: Mapping[str, bytes], replaces: bool = F
     try:
         write_together({partial / name: content for name, content in contents.items()})
         if os.path.lexists(folder):
-            foreign = [folder.name] if folder.is_symlink() or not folder.is_dir() else os.listdir(folder)
-            foreign = [name for name in foreign if name not in contents or not (folder / name).is_file()]
+            names = os.listdir(folder) if folder.is_dir() and not folder.is_symlink() else [folder.name]
+            foreign = [name for name in names if name not in contents or not (folder / name).is_file()]
             if foreign or not replaces:
-                what = f"it holds {foreign[0]!r}, which is not of this export" if foreign else "it exists"
-                raise NotAFile(0, f"{what}; name another folder", str(folder))
+                raise NotAFile(0, f"it exists, and holds {(foreign or names)[0]!r}; name another folder", str(folder))
             folder.rename(before)
         partial.rename(folder)
     finally:
-        if os.path.lexists(before) and not os.path.lexists(folder):
+        if before.exists() and not folder.exists():
             before.rename(folder)
         for remnant in (partial, before):
             shutil.rmtree(remnant, ignore_errors=True)

@@ -228,7 +228,7 @@ def rigid_body_efforts(arm, moved):
 def beside_bodies(arm, moved):
     """The efforts that the table lists beside the URDF, and its friction."""
     tau = np.zeros_like(moved.q)
-    for about, _, value in arm.remainder:
+    for about, value in arm.remainder.items():
         tau[:, arm.model.joints.index(about.joint)] += urdf.remaining_effort(about, value, arm.model, moved)
     for name, (viscous, coulomb) in arm.friction.items():
         dq = moved.dq[:, arm.model.joints.index(name)]

@@ -14,7 +14,6 @@ from davinci_forces.maths.models.terms import Z_OF_MOTION
 
 KINDS = ("", "deflection", "smooth sign", "Stribeck", *Z_OF_MOTION)  # of z, in the order of `state` in model.c
 NO_BAND = {"edges": [inf] * 3, "factor": [1.0] * 4, "model_variance": 0.0}
-NO_BODIES = [[0.0] * len(PARAMETERS)]
 NO_LINK = {"name": "", "parent": None, "coordinate": None, "prismatic": False, "placement": [[0.0] * 4] * 3}
 
 
@@ -31,53 +30,49 @@ def render(export: Export) -> dict[str, str]:
         raise BadRequest(f"{export.study.name}: no identification log gives the noise of the filter of {missing[0]}")
     head = export.head(*(fit for fit, _ in export.fits.values()))
     values = _values(document, [line.replace("*/", "* /").replace("??", "? ?") for line in head])
-    files = {}
-    for name in ("model.h", "model.c"):
-        files[name] = text_of(read_bytes(Path(__file__).with_name(name)))
-        for key, value in values.items():
-            files[name] = files[name].replace(f"@{key}@", value)
+    files = {name: text_of(read_bytes(Path(__file__).with_name(name))) for name in ("model.h", "model.c")}
+    for key, value in values.items():
+        files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
     return files
 
 
 def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:
     """What stands for each @NAME@ in model.h and model.c."""
     chain, joints = document["chain"] or {"up": [0.0] * 3, "links": [NO_LINK]}, document["joints"]
-    links, coupled = chain["links"], [name for name, m in document["models"].items() if m["structure"] == "coupled"]
-    terms = [_terms(document["models"][joint["model"]], joint["name"]) for joint in joints]
-    delays = (f" * {j['name']}: {j['motion']['cutoff']:g} Hz, {j['motion']['effort_lag']:g} s" for j in joints)
+    coordinates, links, models = document["coordinates"], chain["links"], document["models"]
+    coupled = [name for name, model in models.items() if model["structure"] == "coupled"]
+    bodies = [_bodies(models[name], links) for name in coupled] or [[[0.0] * len(PARAMETERS)]]
+    terms = [_terms(models[joint["model"]], joint["name"]) for joint in joints]
+    rows = [
+        [coordinates.index(joint["name"]), coupled.index(joint["model"]) if joint["model"] in coupled else -1,
+         len(terms[i]), f"TERMS_{i}", [*joint["validity"].values()], *_filter(joint["filter"])]
+        for i, joint in enumerate(joints)
+    ]  # fmt: skip
+    lines = (f" *   {j['name']}: {j['motion']['cutoff']:g} Hz, {j['motion']['effort_lag']:g} s" for j in joints)
     return {
-        "HEAD": "\n".join(f" * {line}" for line in head), "PROCESSING": "\n".join(delays),
-        "COORDINATES": ", ".join(document["coordinates"]), "N": str(len(document["coordinates"])),
-        "STATES": str(max(map(len, terms))), "GRAVITY": _text(document["gravity"]), "UP": _text(chain["up"]),
+        "PROCESSING": "\n".join(lines), "COORDINATES": ", ".join(coordinates), "N": str(len(coordinates)),
         "JOINTS": ", ".join(f"DF_{joint['name'].upper().replace('-', '_')}" for joint in joints),
-        "LINKS": str(len(links)), "CHAIN": _text([_link(link) for link in links]),
-        "BODIES": _text([_bodies(document["models"][name], links) for name in coupled] or [NO_BODIES]),
-        "TERMS": "\n".join(f"static const Term TERMS_{i}[] = {_text(rows)};" for i, rows in enumerate(terms)),
-        "MODEL": ",\n".join(
-            _text([document["coordinates"].index(joint["name"]),
-                   coupled.index(joint["model"]) if joint["model"] in coupled else -1, len(terms[i]), f"TERMS_{i}",
-                   [*joint["validity"].values()], *_filter(joint["filter"])])
-            for i, joint in enumerate(joints)
-        ),
+        "STATES": str(max(map(len, terms))), "GRAVITY": _text(document["gravity"]), "UP": _text(chain["up"]),
+        "LINKS": str(len(links)), "CHAIN": _text(list(map(_link, links))), "BODIES": _text(bodies),
+        "TERMS": "\n".join(f"static const Term TERMS_{i}[] = {_text(of_joint)};" for i, of_joint in enumerate(terms)),
+        "MODEL": ",\n".join(map(_text, rows)), "HEAD": "\n".join(f" * {line}" for line in head),
     }  # fmt: skip
 
 
 def _terms(model: Mapping[str, Any], joint: str) -> list[Any]:
     rows = []
-    for p in model["parameters"]:
-        if p["joint"] == joint:
-            kind, *scales = (p["state"] or {"kind": ""}).values()
-            number = KINDS.index(scales[0] if kind == "function" else kind)
-            scale = scales[0] if kind in KINDS[1:4] else 0.0
-            std, c = inf if p["std"] is None else p["std"], [p["functions"].get(name, 0.0) for name in COEFFICIENTS]
-            rows.append([p["value"], std, p["acceleration"], c, scale, number, int(p["role"] == "friction")])
+    for p in (p for p in model["parameters"] if p["joint"] == joint):
+        kind, scale = (p["state"] or {"kind": "", "": 0.0}).values()
+        kind, scale = (scale, 0.0) if kind == "function" else (kind, scale)
+        std, c = inf if p["std"] is None else p["std"], [p["functions"].get(name, 0.0) for name in COEFFICIENTS]
+        rows.append([p["value"], std, p["acceleration"], c, scale, KINDS.index(kind), int(p["role"] == "friction")])
     return rows
 
 
 def _link(link: Mapping[str, Any]) -> list[Any]:
     parent, k = link["parent"], link["coordinate"]
-    is_turned = not link["prismatic"] and k is not None
-    return [0 if parent is None else parent + 1, -1 if k is None else k, int(not is_turned), link["placement"][:3]]
+    slides = link["prismatic"] or k is None
+    return [0 if parent is None else parent + 1, -1 if k is None else k, int(slides), link["placement"][:3]]
 
 
 def _bodies(model: Mapping[str, Any], links: list[Any]) -> list[Any]:
@@ -86,13 +81,12 @@ def _bodies(model: Mapping[str, Any], links: list[Any]) -> list[Any]:
 
 
 def _filter(online: Mapping[str, Any]) -> list[Any]:
-    band = online["band"] or NO_BAND
-    numbers = [1.0 / online["rate"], online["R"], online["Q"], online["initial_std"]]
-    return [*numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0]
+    band, numbers = online["band"] or NO_BAND, [online[name] for name in ("R", "Q", "initial_std")]
+    return [1.0 / online["rate"], *numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0]
 
 
 def _text(value: Any) -> str:
     """A number, a name or a nested list as C."""
     if isinstance(value, list):
         return f"{{{', '.join(map(_text, value))}}}"
-    return "INFINITY" if value == inf else str(value) if isinstance(value, str) else repr(value)
+    return "INFINITY" if value == inf else str(value)

@@ -126,16 +126,20 @@ def terms_of(model: Model) -> list[ModelTerm]:
 
 def _chain(chain: Chain) -> dict[str, Any]:
     columns = (chain.links, chain.parent.tolist(), chain.coordinate.tolist(), chain.slides.tolist())
-    links = [
-        {"name": name, "parent": parent - 1 if parent else None, "coordinate": None if k == FIXED else k,
-         "prismatic": slides, "placement": T}
-        for name, parent, k, slides, T in zip(*columns, chain.placement.tolist(), strict=True)
-    ]  # fmt: skip
-    return {"up": list(chain.up), "links": links}
+    rows = zip(*columns, chain.placement.tolist(), strict=True)
+    names = ("name", "parent", "coordinate", "prismatic", "placement")
+    links = [(name, i - 1 if i else None, None if k == FIXED else k, *more) for name, i, k, *more in rows]
+    return {"up": list(chain.up), "links": [dict(zip(names, link, strict=True)) for link in links]}
 
 
 def _model(fit: Fit, model: Model) -> dict[str, Any]:
-    rows = zip(fit.parameter, fit.theta.tolist(), map(_finite, fit.theta_std.tolist()), fit.unit, strict=True)
+    rows = zip(
+        fit.parameter,
+        fit.theta.tolist(),
+        (x if isfinite(x) else None for x in fit.theta_std.tolist()),
+        fit.unit,
+        strict=True,
+    )
     parameters = [
         {"name": str(name), "joint": about.joint or None, "value": value, "std": std, "unit": str(unit)}
         | (_term(about.term) if about.term else {"role": "link", "link": about.link, "inertial": about.inertial})
@@ -155,21 +159,10 @@ def _term(term: Term) -> dict[str, Any]:
 
 
 def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
-    limits, i = joint.joint.limits, joint.model.efforts.index(joint.name)
-    ends = zip(UNITS, (limits.q, limits.dq, (-limits.effort, limits.effort)), strict=True)
-    return {
-        "name": joint.name, "title": joint.joint.title, "kind": joint.joint.kind.value, "verdict": verdict,
-        "units": {name: joint.joint.unit(unit) for name, unit in UNITS.items()},
-        "gear_ratio": joint.joint.gear_ratio, "torque_constant": joint.joint.torque_constant,
-        "limits": {name: [_finite(low), _finite(high)] for name, (low, high) in ends},
-        "model": ".".join(joint.fit.key),
-        "motion": {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]},
-        "validity": joint.validity, "filter": joint.filter,
-    }  # fmt: skip
-
-
-def _finite(x: float) -> float | None:
-    return x if isfinite(x) else None
+    i, units = joint.model.efforts.index(joint.name), {name: joint.joint.unit(unit) for name, unit in UNITS.items()}
+    motion = {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]}
+    about = {"name": joint.name, "kind": joint.joint.kind.value, "verdict": verdict, "model": ".".join(joint.fit.key)}
+    return {**about, "units": units, "motion": motion, "validity": joint.validity, "filter": joint.filter}
 
 
 def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: Sequence[str] = ()) -> Export:

@@ -5,6 +5,10 @@
 
 #include <math.h>
 #define FOR(i, n) for (int i = 0; i < (n); i++)
+#define GUARD(q, dq, ddq) \
+    df_status status = check(j, q, dq, ddq); \
+    if (status == DF_BAD_INPUT) return status; \
+    const Joint *m = &MODEL[j];
 
 /* c: of 1, sin q, cos q, q, dq, sign(dq), z.  kind: of z.  set: of bodies, or -1.  range: of q, dq, tau. */
 typedef struct { double value, std, ddq, c[7], scale; int kind, friction; } Term;
@@ -24,28 +28,21 @@ static const Joint MODEL[DF_JOINTS] = {
 };
 
 static double sign(double x) { return (double)((x > 0) - (x < 0)); }
-static double limited(const Joint *m, double x) {
-    const double most = fmax(fabs(m->range[2][0]), fabs(m->range[2][1]));
-    return fmax(-most, fmin(most, x));
-}
-
+static double limited(double x, double a, double b) { return fmax(-fmax(fabs(a), fabs(b)), fmin(fmax(fabs(a), fabs(b)), x)); }
 static double state(const Term *p, double z, double q, double dq) {
     const double s = sign(dq), v = p->scale > 0 ? dq / p->scale : 0;
     const double of[] = {0, z, tanh(v), s * exp(-v * v), fabs(dq), fabs(dq) * dq, q * dq, q * s, q * q * s, q * q,
                          q * q * q, sin(2 * q), cos(2 * q), sin(3 * q), cos(3 * q)};
     return of[p->kind];
 }
-
 static double phi(const Term *p, double z, double q, double dq, double ddq) {
     const double *c = p->c;
     return p->ddq * ddq + c[0] + c[1] * sin(q) + c[2] * cos(q) + c[3] * q + c[4] * dq + c[5] * sign(dq)
         + c[6] * state(p, z, q, dq);
 }
-
 static void cross(const double *a, const double *b, double *y) { /* y += a x b */
     FOR(i, 3) y[i] += a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
-
 static void accelerate(const double *w, const double *e, const double *r, double *y) { /* y += e x r + w x (w x r) */
     double v[3] = {0};
     cross(w, r, v), cross(w, v, y), cross(e, r, y);
@@ -70,11 +67,9 @@ static double links_effort(int set, int row, const double *q, const double *dq, 
         accelerate(w[parent], e[parent], r[l], of);
         FOR(i, 3) FOR(j, 3) w[b][i] += R[l][j][i] * w[parent][j], e[b][i] += R[l][j][i] * e[parent][j], a[b][i] += R[l][j][i] * of[j];
         cross(w[b], z, turn);
-        FOR(i, 3) {
-            if (slides) a[b][i] += 2 * v * turn[i] + u * z[i];
-            else e[b][i] += v * turn[i] + u * z[i], w[b][i] += v * z[i];
-            f[b][i] = m[0] * a[b][i];
-        }
+        FOR(i, 3) if (slides) a[b][i] += 2 * v * turn[i] + u * z[i];
+        else e[b][i] += v * turn[i] + u * z[i], w[b][i] += v * z[i];
+        FOR(i, 3) f[b][i] = m[0] * a[b][i];
         accelerate(w[b], e[b], h, f[b]);
         FOR(i, 3) FOR(j, 3) spin[i] += I[i][j] * w[b][j], n[b][i] += I[i][j] * e[b][j];
         cross(h, a[b], n[b]), cross(w[b], spin, n[b]);
@@ -88,62 +83,48 @@ static double links_effort(int set, int row, const double *q, const double *dq, 
     }
     return tau;
 }
-
 static df_status check(int j, const double *q, const double *dq, const double *ddq) {
     df_status status = DF_OK;
     if (j < 0 || j >= DF_JOINTS) return DF_BAD_INPUT;
-    FOR(i, DF_COORDINATES) if (i == MODEL[j].row || MODEL[j].set >= 0)
-        if (!isfinite(q[i]) || !isfinite(dq[i]) || !isfinite(ddq[i])) return DF_BAD_INPUT;
+    FOR(i, DF_COORDINATES) if ((i == MODEL[j].row || MODEL[j].set >= 0) && !isfinite(q[i] + dq[i] + ddq[i])) return DF_BAD_INPUT;
     FOR(i, DF_JOINTS) if (i == j || MODEL[j].set >= 0) {
         const double x[2] = {q[MODEL[i].row], dq[MODEL[i].row]};
         FOR(k, 2) if (x[k] < MODEL[i].range[k][0] || x[k] > MODEL[i].range[k][1]) status = DF_OUTSIDE_VALIDITY;
     }
     return status;
 }
-
 df_status df_inertia(int j, const double *q, double *M) {
-    const df_status status = check(j, q, STILL, STILL);
-    if (status == DF_BAD_INPUT) return status;
-    const Joint *m = &MODEL[j];
+    GUARD(q, STILL, STILL)
     double unit[DF_COORDINATES] = {0};
     unit[m->row] = 1;
     *M = m->set >= 0 ? links_effort(m->set, m->row, q, STILL, unit, 0) : 0;
     FOR(i, m->terms) *M += m->term[i].value * m->term[i].ddq;
     return status;
 }
-
 df_status df_effort(int j, const df_state *s, const double *q, const double *dq, const double *ddq, double *tau) {
-    const df_status status = check(j, q, dq, ddq);
-    if (status == DF_BAD_INPUT) return status;
-    const Joint *m = &MODEL[j];
+    GUARD(q, dq, ddq)
     const int k = m->row;
     *tau = m->set >= 0 ? links_effort(m->set, k, q, dq, ddq, GRAVITY) : 0;
     FOR(i, m->terms) *tau += m->term[i].value * phi(&m->term[i], s->z[i], q[k], dq[k], ddq[k]);
     return status;
 }
-
-df_status df_bias(int j, const df_state *s, const double *q, const double *dq, double *tau) {
-    return df_effort(j, s, q, dq, STILL, tau);
-}
+df_status df_bias(int j, const df_state *s, const double *q, const double *dq, double *tau) { return df_effort(j, s, q, dq, STILL, tau); }
 
 df_status df_gravity(int j, const double *q, double *tau) {
     const df_state still = {0, 0, {0}, {0}};
     const df_status status = df_effort(j, &still, q, STILL, STILL, tau);
-    if (status != DF_BAD_INPUT) *tau = limited(&MODEL[j], *tau);
+    if (status != DF_BAD_INPUT) *tau = limited(*tau, MODEL[j].range[2][0], MODEL[j].range[2][1]);
     return status;
 }
-
 df_status df_friction(int j, const df_state *s, const double *q, const double *dq, double *tau) {
-    const df_status status = check(j, q, dq, STILL);
-    if (status == DF_BAD_INPUT) return status;
-    const Joint *m = &MODEL[j];
+    GUARD(q, dq, STILL)
     const double v = dq[m->row];
     double against = 0; /* friction against the motion, minus the errors of all terms as if they were one */
     FOR(i, m->terms) if (m->term[i].friction) {
         const double x = phi(&m->term[i], s->z[i], q[m->row], v, 0);
         against += sign(v) * m->term[i].value * x - (x == 0 ? 0 : m->term[i].std * fabs(x));
     }
-    *tau = sign(v) * limited(m, fmax(against, 0));
+    *tau = sign(v) * limited(fmax(against, 0), m->range[2][0], m->range[2][1]);
     return status;
 }
 
@@ -177,25 +158,19 @@ static void predict(const Joint *m, double *x, double drive, double M) {
         *out++ = B[a][0] * F[b][0] + B[a][1] * F[b][1] + B[a][2] * F[b][2] + m->Q[a][b];
     x[6] += d * d * (1 - sure * sure); /* the sign of Coulomb friction is uncertain near zero velocity */
 }
-
 df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
-    df_status status = check(j, in->q, in->dq, in->ddq);
-    const double y[4] = {in->q_measured, in->dq_measured, in->tau, in->t};
-    if (status == DF_BAD_INPUT || (s->runs && !(in->t > s->t))) return DF_BAD_INPUT;
-    FOR(i, 4) if (!isfinite(y[i])) return DF_BAD_INPUT;
-    const Joint *m = &MODEL[j];
-    const double q = in->q[m->row], dq = in->dq[m->row], *range = m->range[2];
-    double M, known;
-    int speed = 0;
-    if (in->tau < range[0] || in->tau > range[1]) status = DF_OUTSIDE_VALIDITY;
+    GUARD(in->q, in->dq, in->ddq)
+    const double y[4] = {in->q_measured, in->dq_measured, in->tau, in->t}, q = in->q[m->row], dq = in->dq[m->row];
+    FOR(i, 4) if (!isfinite(y[i]) || (s->runs && in->t <= s->t)) return DF_BAD_INPUT;
+    if (in->tau < m->range[2][0] || in->tau > m->range[2][1]) status = DF_OUTSIDE_VALIDITY;
     if (!s->runs || in->t - s->t > 1.5 * m->T) {
         const df_state first = {1, 0, {0}, {y[0], y[1], 0, 1e6 * m->R[0], 0, 0, 1e6 * m->R[1], 0, m->start * m->start}};
         *s = first;
     }
-    s->t = in->t;
-    df_inertia(j, in->q, &M), df_effort(j, s, in->q, in->dq, in->ddq, &out->tau_hat);
-    correct(m, s->x, y);
+    double M, known;
+    int speed = 0;
     while (speed < 3 && fabs(dq) > m->edge[speed]) speed++;
+    df_inertia(j, in->q, &M), df_effort(j, s, in->q, in->dq, in->ddq, &out->tau_hat), correct(m, s->x, y), s->t = in->t;
     out->tau_ext = s->x[2], out->std_filter = sqrt(s->x[8]);
     out->std = fmax(out->std_filter, m->factor[speed] * sqrt(s->x[8] + m->model_variance));
     out->contact = m->alarm > 0 ? fabs(out->tau_ext) > m->alarm : -1;

@@ -1,12 +1,10 @@
 /*
 @HEAD@
- *
- * C99 and C++, no allocation, doubles in the joints' units.  Every q, dq and ddq has the DF_COORDINATES coordinates
- * @COORDINATES@; a joint of a coupled arm needs all of them.  They pass a low-pass and are
- * delayed as `joints` below says: the standard deviation leaves out what that delay costs.
- * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
- * one standard error, never along the motion.  Both are limited to the largest effort recorded.
+ * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them,
+ * low-passed and delayed as below.  The standard deviation leaves out what a filter's delay costs.
 @PROCESSING@
+ * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
+ * one standard error, never more than the motion loses.  Both are limited to the largest effort recorded.
  */
 #ifndef DAVINCI_FORCES_MODEL_H
 #define DAVINCI_FORCES_MODEL_H

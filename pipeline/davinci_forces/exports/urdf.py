@@ -4,7 +4,7 @@ theta = A x: many bodies x have the identified parameters.  Those nearest to the
 are written; drives, cables and offsets get what no body can explain.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,11 +13,12 @@ import numpy as np
 from davinci_forces.errors import BadRequest
 from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, terms_of
 from davinci_forces.identification.joint_models import LogModels
+from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.estimation.conic import LENGTH, complete
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, as_bodies
-from davinci_forces.maths.models.coupled import ADDED, LINK_UNITS, CoupledArm
+from davinci_forces.maths.models.coupled import ADDED, CoupledArm
 from davinci_forces.maths.models.independent import add
 from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion
@@ -30,7 +31,7 @@ from davinci_forces.robots.urdf import writing
 TABLE = "arm.md"
 CONSISTENT = "consistent"  # estimator
 NEGLIGIBLE_MASS = 1e-8  # [kg] of a link: the solver's error of 0
-NEGLIGIBLE_COEFFICIENT = 1e-9  # of a combination: a rounding error of 0
+ROUNDING = 1e-9  # of a coefficient that is 0
 PREFERENCE = 10.0  # price of efforts of drives, cables and offsets over that of links, which explain what they can
 
 
@@ -41,13 +42,8 @@ class IdentifiedArm(NamedTuple):
     fit: Fit
     model: CoupledArm
     inertial: Array  # (L, 10) parameters of the links
-    remainder: tuple[tuple[ModelTerm, str, float], ...]  # what URDF cannot hold: term, unit, value
-
-    @property
-    def friction(self) -> dict[str, tuple[float, float]]:
-        """Viscous and Coulomb friction of each joint."""
-        values = {(t.joint, t.term): v for t, v in zip(terms_of(self.model), self.fit.theta.tolist(), strict=True)}
-        return {name: (values[name, viscous], values[name, coulomb]) for name in self.model.efforts}
+    friction: dict[str, tuple[float, float]]  # viscous and Coulomb, by joint
+    remainder: dict[ModelTerm, float]  # what URDF cannot hold
 
 
 def render(export: Export) -> dict[str, str]:
@@ -64,7 +60,10 @@ def render(export: Export) -> dict[str, str]:
     if missing:
         raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json does not")
     arm = completed_arm(robot, consistent_fit(export))
-    note = [f"bodies and friction: {'.'.join(arm.fit.key)}; {TABLE} says what a URDF does not hold"]
+    near = "nearest to the robot's guesses" if robot.bodies else "of the least mass"
+    note = [
+        f"fit {'.'.join(arm.fit.key)}; of all bodies that have it, those {near}; {TABLE}: what a URDF does not hold"
+    ]
     urdf = writing.text(arm.robot, export.head(arm.fit) + note, arm.friction)
     return {"arm.urdf": urdf, TABLE: "\n".join([*export.head(), *note, *_tables(export, arm)]) + "\n"}
 
@@ -95,8 +94,7 @@ def consistent_fit(export: Export) -> Fit:
     every = candidates(study.robot, separate, together, reaches, len(logs)) if together else []
     shared = [candidate for candidate in every if candidate.parts[0].model.group == ARM]
     selection = select_candidate(shared, len(logs)) if shared else None
-    refitted = fits(selection.chosen, shared, len(logs), study.robot, True) if selection else ()
-    for record in refitted:
+    for record in fits(selection.chosen, shared, len(logs), study.robot, True) if selection else ():
         if isinstance(record, Fit) and record.estimator == CONSISTENT:
             return record
     raise BadRequest(f"{study.name}: a URDF needs bodies, and no identification log moves the joints together")
@@ -104,28 +102,19 @@ def consistent_fit(export: Export) -> Fit:
 
 def completed_arm(robot: Robot, fit: Fit) -> IdentifiedArm:
     """Complete a consistent fit to bodies, drives and cables."""
-    from davinci_forces.identification.used import Identified
-
     model = Identified(robot, [fit]).model(fit)
     assert isinstance(model, CoupledArm)
-    L, m = len(model.chain.links), len(model.rows)
-    kinds = [robot.joints[row].kind for row in model.rows]
-    length = np.array([1.0 if kind is Kind.PRISMATIC else LENGTH for kind in kinds])
-    price = PREFERENCE / np.r_[length**2, GRAVITY * length, GRAVITY * length]
-    frictions = np.ones(len(model.parameters) - len(model.base.columns))
+    L, base = 10 * len(model.chain.links), len(model.base.columns)
+    length = np.array([1.0 if robot.joints[row].kind is Kind.PRISMATIC else LENGTH for row in model.rows])
+    price = PREFERENCE / np.r_[length**2, GRAVITY * length, GRAVITY * length]  # of `ADDED`
     guess = robot.bodies.parameters(model.chain.n) if robot.bodies else None
-    x = complete(fit.theta, model.mechanism, np.r_[price, frictions], guess)
-    inertial = x[: 10 * L].reshape(L, 10)
+    x = complete(fit.theta, model.mechanism, np.r_[price, np.ones(len(fit.theta) - base)], guess)
+    inertial = x[:L].reshape(-1, 10)
     inertial = inertial * (inertial[:, :1] > NEGLIGIBLE_MASS)
-    drives = [ModelTerm(name, DRIVE[which]) for which in range(len(ADDED)) for name in model.efforts]
-    values = [*zip(drives, x[10 * L : 10 * L + 3 * m].tolist(), strict=True)]
-    values += [*zip(terms_of(model), fit.theta.tolist(), strict=True)][len(model.base.columns) :]
-    remainder = tuple(
-        (about, robot.joint(about.joint).unit(about.term.unit), value)
-        for about, value in values
-        if about.term and about.term not in (viscous, coulomb)
-    )
-    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, inertial, remainder)
+    drives = [ModelTerm(name, term) for term in DRIVE for name in model.efforts]
+    values = dict(zip([*drives, *terms_of(model)[base:]], x[L:].tolist(), strict=True))
+    friction = {j: (values.pop(ModelTerm(j, viscous)), values.pop(ModelTerm(j, coulomb))) for j in model.efforts}
+    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, inertial, friction, values)
 
 
 def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: ArmMotion) -> Array:
@@ -138,57 +127,49 @@ def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: 
 
 
 def _tables(export: Export, arm: IdentifiedArm) -> Iterator[str]:
-    fit, names = arm.fit, [f"{p} of {link}" for link in arm.model.chain.links for p in PARAMETERS]
-    K = arm.model.base.combination
+    fit, names = arm.fit, [f"{which} of {link}" for link in arm.model.chain.links for which in PARAMETERS]
+    rows = arm.model.mechanism.matrix[: len(arm.model.base.columns), : len(names)]
+    sums = [
+        " ".join(f"{c:+.4g} {name}" for c, name in zip(row, names, strict=True) if abs(c) > ROUNDING) for row in rows
+    ]
+    sums += [""] * (len(fit.theta) - len(sums))
+    numbers = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, sums, strict=True)
     yield "\n# Identified parameters\n\nOnly these combinations follow from the logs."
     yield from _table("parameter", "value", "standard error", "unit", "combination")
-    for i, name in enumerate(fit.parameter):
-        terms = enumerate(K[i, : len(names)].tolist()) if i < len(K) else ()
-        text = " ".join(f"{c:+.4g} {names[k]}" for k, c in terms if abs(c) > NEGLIGIBLE_COEFFICIENT)
-        yield from _table(name, f"{fit.theta[i]:.6g}", f"{fit.theta_std[i]:.2g}", fit.unit[i], text, head=False)
-    near = "nearest to the robot's guesses" if export.study.robot.bodies else "of the least mass"
-    yield f"\n# Bodies\n\nOf all bodies with these parameters, those {near}, about the origins of the links' frames."
-    units = (f"{name} [{unit}]" for name, unit in zip(PARAMETERS, LINK_UNITS, strict=True))
-    yield from _table("link", *units)
-    for link, ten in zip(arm.model.chain.links, arm.inertial, strict=True):
-        yield from _table(link, *(f"{value:.5g}" for value in ten), head=False)
+    yield from (_row(name, f"{value:.6g}", f"{std:.2g}", unit, text) for name, value, std, unit, text in numbers)
     yield from _efforts(export, arm)
 
 
 def _efforts(export: Export, arm: IdentifiedArm) -> Iterator[str]:
     """What URDF cannot hold, and the error of both models, over the logs of free motion."""
-    logs: dict[str, list[Motion]] = {}
-    for motion in export.catalogue.records(Motion):
-        if motion.role in FREE_ROLES:
-            logs.setdefault(motion.log, []).append(motion)
-    along = [LogModels(export.identified, log) for log in logs.values() if len(log) == len(arm.model.joints)]
+    free = [motion for motion in export.catalogue.records(Motion) if motion.role in FREE_ROLES]
+    logs = [[motion for motion in free if motion.log == log] for log in dict.fromkeys(motion.log for motion in free)]
+    whole = [log for log in logs if len(log) == len(arm.model.joints) and len({len(motion) for motion in log}) == 1]
+    along = [LogModels(export.identified, log) for log in whole]
+    tau = {name: [motion.tau for log in whole for motion in log if motion.joint == name] for name in arm.model.joints}
     yield "\n# What the URDF does not hold\n\nShare: of the root mean square of the measured effort in free motion."
     yield from _table("joint", "term", "value", "unit", "share")
-    rms = {name: _rms([log.effort(name) for log in along]) for name in arm.model.efforts}
-    for about, unit, value in arm.remainder:
-        tau = (remaining_effort(about, value, arm.model, log.motion(arm.fit, about.joint)) for log in along)
-        term = about.term.name if about.term else ""
-        term = ADDED[DRIVE.index(about.term)] if about.term in DRIVE else term
-        share = f"{100 * _rms([*tau]) / rms[about.joint]:.2g} %"
-        yield from _table(about.joint, term, f"{value:.5g}", unit, share, head=False)
+    for about, value in arm.remainder.items():
+        assert about.term
+        effort = (remaining_effort(about, value, arm.model, log.motion(arm.fit, about.joint)) for log in along)
+        name = ADDED[DRIVE.index(about.term)] if about.term in DRIVE else about.term.name
+        unit = export.study.robot.joint(about.joint).unit(about.term.unit)
+        yield _row(about.joint, name, f"{value:.5g}", unit, f"{100 * _rms(effort) / _rms(tau[about.joint]):.2g} %")
     yield "\n# Error of the models, where fitted and validated, root mean square"
     yield from _table("joint", "unit", "effort", "this fit", "chosen model")
-    for joint in export.joints:
-        errors = [
-            _rms([log.effort(joint.name) - log.tau_hat(fit, joint.name) for log in along])
-            for fit in (arm.fit, joint.fit)
-        ]
-        numbers = (f"{number:.4g}" for number in (rms[joint.name], *errors))
-        yield from _table(joint.name, joint.joint.unit("{effort}"), *numbers, head=False)
+    for name, joint, fit, *_ in export.joints:
+        hats = ([log.tau_hat(f, name) for log in along] for f in (arm.fit, fit))
+        errors = (_rms(map(np.subtract, tau[name], hat)) for hat in hats)
+        yield _row(name, joint.unit("{effort}"), *(f"{number:.4g}" for number in (_rms(tau[name]), *errors)))
 
 
-def _rms(signals: Sequence[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(signals) ** 2)))
+def _rms(signals: Iterable[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([*signals]) ** 2)))
 
 
-def _table(*cells: object, head: bool = True) -> Iterator[str]:
-    if head:
-        yield ""
-    yield f"| {' | '.join(map(str, cells))} |"
-    if head:
-        yield "|---" * len(cells) + "|"
+def _table(*titles: str) -> tuple[str, ...]:
+    return ("", _row(*titles), "|---" * len(titles) + "|")
+
+
+def _row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"

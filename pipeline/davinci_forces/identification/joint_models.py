@@ -56,10 +56,6 @@ class LogModels:
         processing = self.identified.cutoff_and_lag(fit, joint)
         return joined_motion([self.joint_motion(name, processing) for name in self.identified.model(fit).joints])
 
-    def effort(self, joint: str) -> Array:
-        """Return the measured effort (N,) of a joint."""
-        return self._records[joint].tau
-
     def tau_hat(self, fit: Fit, joint: str) -> Array:
         """Compute the effort (N,) of a joint by a fit."""
         model = self.identified.model(fit)

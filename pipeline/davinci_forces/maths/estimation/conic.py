@@ -202,8 +202,8 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
     trace = links & np.isin(np.arange(n) % TEN, DIAGONAL)
     bounded = np.r_[: TEN * L, np.flatnonzero(mechanism.positive & ~links)]
     rows = csc_array(np.vstack([F / size[:, None], -np.eye(n)[bounded]]))
-    kinds: list[Any] = [clarabel.ZeroConeT(len(F)), *[clarabel.PSDTriangleConeT(4)] * L]
-    kinds += [clarabel.NonnegativeConeT(len(bounded) - TEN * L)]
+    signs = clarabel.NonnegativeConeT(len(bounded) - TEN * L)
+    kinds = [clarabel.ZeroConeT(len(F)), *[clarabel.PSDTriangleConeT(4)] * L, signs]
     squares = diags_array(2.0 * (~links | (guess is not None)), format="csc")
     cost, right = trace * 1.0 if guess is None else -2.0 * z_guess, np.r_[theta / size, np.zeros(len(bounded))]
     z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, careful_settings()).solve().x)

@@ -6,6 +6,7 @@ several links, the first joint is independent and the other joints mimic it.  UR
 acceleration, missing limits or drives.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -34,15 +35,15 @@ def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
-    title, *remarks = (line.replace("--", "- -").rstrip("-") for line in (robot.title, *remarks))  # as XML demands
+    title, *remarks = (re.sub("-(?=-|$)", "- ", x) for x in (robot.title, *remarks))  # an XML comment has no --
     weightless = "" if robot.bodies else "; the masses of its links are not known"
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {title}, in m, rad and kg, z up{weightless} -->",
-        *(f"<!-- {line} -->" for line in remarks),
+        *(f"<!-- {remark} -->" for remark in remarks),
         f"<robot name={quoteattr(robot.name)}>",
         f"  <link name={quoteattr(robot.chain.names[0])}/>",
-        *(f"  {line}" for line in _body(_turned(robot, robot.chain), robot.chain, friction or {})),
+        *(f"  {line}" for line in _body(_turned(robot, robot.chain, friction or {}), robot.chain)),
         "</robot>",
     ]
     return "\n".join(lines) + "\n"
@@ -57,9 +58,10 @@ class _Turned(NamedTuple):
     axis: Array  # (L, 3)
     bodies: Bodies | None
     offset: Array  # poses of the chain's frames in their bodies (F, 4, 4)
+    friction: Mapping[str, tuple[float, float]]
 
 
-def _turned(robot: Robot, chain: Chain) -> _Turned:
+def _turned(robot: Robot, chain: Chain, friction: Mapping[str, tuple[float, float]]) -> _Turned:
     """Express the robot in the named frames of its links, as far as these are on the joint axes."""
     frames = chain.of_links.copy()
     frames[frames[:, :3, 3].any(axis=1)] = np.eye(
@@ -69,16 +71,16 @@ def _turned(robot: Robot, chain: Chain) -> _Turned:
     back = np.linalg.inv(by_body)
     return _Turned(
         robot, (chain.names[0], *chain.links), back[chain.parent] @ chain.placement @ frames, back[1:, :3, 2],
-        robot.bodies.in_frames(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset,
+        robot.bodies.in_frames(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset, friction,
     )  # fmt: skip
 
 
-def _body(turned: _Turned, chain: Chain, friction: Mapping[str, tuple[float, float]]) -> Iterator[str]:
+def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
     """The lines of all links and joints, and of the frames that are fixed to links."""
     moved = set[int]()
     for i, coordinate in enumerate(chain.coordinate.tolist()):
         yield from _link(turned, i)
-        yield from _joint(turned, chain, i, coordinate in moved, friction)
+        yield from _joint(turned, chain, i, coordinate in moved)
         moved.add(coordinate)
     taken = set(turned.links)
     for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
@@ -105,9 +107,7 @@ def _link(turned: _Turned, i: int) -> Iterator[str]:
     yield "</link>"
 
 
-def _joint(
-    turned: _Turned, chain: Chain, i: int, mimics: bool, friction: Mapping[str, tuple[float, float]]
-) -> Iterator[str]:
+def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]:
     """The lines of a link's joint: an independent joint, or a joint that mimics it."""
     robot, k = turned.robot, int(chain.coordinate[i])
     parent, child = turned.links[chain.parent[i]], turned.links[i + 1]
@@ -120,11 +120,10 @@ def _joint(
     yield from _origin(parent, child, turned.placement[i])
     yield f'  <axis xyz="{_numbers(turned.axis[i])}"/>'
     yield f"  <limit {_limits(limits, bounded or bool(chain.slides[i]))}/>"
-    if coordinate in friction and not mimics:
-        viscous, coulomb = map(_number, friction[coordinate])
-        yield f'  <dynamics damping="{viscous}" friction="{coulomb}"/>'
     if mimics:
         yield f'  <mimic joint={quoteattr(coordinate)} multiplier="1" offset="0"/>'
+    elif coordinate in turned.friction:
+        yield '  <dynamics damping="{}" friction="{}"/>'.format(*map(_number, turned.friction[coordinate]))
     yield "</joint>"
 
 
