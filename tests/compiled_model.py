@@ -7,6 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.exports import renderer
+from davinci_forces.filters import ekf
+from davinci_forces.filters.problem import filter_inputs
+from davinci_forces.filters.response import noise_model
+from davinci_forces.identification.joint_models import LogModels
+from davinci_forces.records import FilterNoise, JointModel, Motion
 
 FLAGS = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 AS_C, AS_CPP = ("-std=c99",), ("-std=c++11", "-x", "c++")
@@ -53,3 +61,39 @@ class CompiledModel:
 
 def structure(**fields) -> type:
     return type("Fields", (ctypes.Structure,), {"_fields_": list(fields.items())})
+
+
+def same_along_logs(export, folder: Path) -> int:
+    """Compare the compiled model with every recorded log, as the study's filter sees it; return the samples."""
+    compiled, samples, robot = CompiledModel(renderer("c")(export), folder), 0, export.study.robot
+    for log in dict.fromkeys(m.log for m in export.catalogue.records(JointModel)):
+        motions = export.catalogue.select(Motion, log=log)
+        along = LogModels(export.identified, motions)
+        for number, joint in enumerate(export.joints):
+            for m in export.catalogue.select(JointModel, log=log, joint=joint.name):
+                if m.stand_in or not np.isclose(m.rate, joint.filter["rate"], rtol=1e-12):
+                    continue
+                moved, columns = along.motion(joint.fit, joint.name), np.zeros((3, len(m), len(robot.joints)))
+                for k, name in enumerate(joint.model.joints):
+                    at = [j.name for j in robot.joints].index(name)
+                    columns[:, :, at] = moved.q[:, k], moved.dq[:, k], moved.ddq[:, k]
+                noise = noise_model(export.catalogue.select(FilterNoise, joint=joint.name)[0], joint.joint, 1.0 / m.rate,
+                                    export.study.settings.q_tau)  # fmt: skip
+                start = joint.filter["initial_std"]
+                passes = [ekf.track(part._replace(initial_std=start), noise) for part in filter_inputs(m)]
+                rows = []
+                compiled.restart()
+                for k in range(len(m)):
+                    t = (k + 5 * m.segment[k]) / m.rate
+                    status = compiled.step(number, t, m.tau[k], m.q_measured[k], m.dq_measured[k], *columns[:, k])
+                    assert status != BAD
+                    rows.append((compiled.result.tau_hat, compiled.result.tau_ext, compiled.result.std_filter))
+                size = 1e-12 * np.abs(m.tau).max()
+                expected = [
+                    m.tau_hat,
+                    *(np.concatenate([getattr(p, x) for p in passes]) for x in ("tau_ext", "tau_ext_std")),
+                ]
+                for ours, theirs in zip(np.transpose(rows), expected, strict=True):
+                    assert_allclose(ours, theirs, rtol=0, atol=size, err_msg=f"{log}/{joint.name}")
+                samples += len(m)
+    return samples

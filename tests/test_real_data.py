@@ -7,6 +7,12 @@ import shutil
 import pytest
 
 from davinci_forces import robots
+from davinci_forces.records import KINDS
+from davinci_forces.runner import reporting, runs
+from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.plan import Plan
+from davinci_forces.study import reading
+from tests.compiled_model import same_along_logs
 from tests.conftest import ROOT
 from tests.test_runs import call
 
@@ -233,6 +239,16 @@ def test_the_arm_leaves_as_a_urdf_that_loads_and_says_what_it_lacks(dvrk, tmp_pa
         [row] = re.findall(rf"^\| {joint} \| \S.* \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
         effort, consistent, chosen = map(float, row)
         assert chosen < consistent < 0.25 * effort
+
+
+def test_the_coupled_model_of_a_real_arm_in_c_gives_its_numbers_along_every_log(dvrk, tmp_path):
+    from davinci_forces.exports.identified import ExportOrigin, export_of
+
+    study, ledger = reading.read(dvrk), Ledger(runs.folders(dvrk, None, None))
+    catalogue = reporting.catalogue(ledger, Plan(study, ledger).places().find(tuple(KINDS.values())))
+    export = export_of(study, catalogue, ExportOrigin("", "", {}))
+    assert {joint.fit.structure for joint in export.joints} == {"coupled"}
+    assert same_along_logs(export, tmp_path) == 3 * 3 * 5999
 
 
 def test_currents_do_not_become_a_urdf(ur10e, tmp_path):

@@ -23,6 +23,7 @@ from davinci_forces.robots.dvrk_psm import ROBOT as PSM
 from davinci_forces.robots.urdf import writing
 from tests import arm as tested_arm
 from tests import exported as exported_models
+from tests.compiled_model import same_along_logs
 from tests.exported import ORIGIN, RATE, export, motion
 
 
@@ -178,6 +179,10 @@ def test_the_json_of_a_study_predicts_what_the_study_predicted(small, catalogue)
             column[:, document["coordinates"].index(m.joint)] = getattr(m, name)
         tau = predicted(document, m.joint, *columns, m.segment, 1.0 / m.rate)
         assert_allclose(tau, m.tau_hat, rtol=0, atol=1e-12 * np.abs(m.tau_hat).max())
+
+
+def test_the_c_of_a_study_gives_the_study_s_numbers_along_every_log(small, tmp_path):
+    assert same_along_logs(small, tmp_path) > 1000
 
 
 def mistakes(schema, value, place=""):

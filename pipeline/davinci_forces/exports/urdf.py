@@ -58,7 +58,7 @@ def render(export: Export) -> dict[str, str]:
     missing = [f"effort in N m or N: that of {', '.join(currents)} is in A; state torque_constant"] * bool(currents)
     missing += ["the geometry of the robot: state its chain"] * (robot.chain is None)
     if missing:
-        raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json does not")
+        raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json and c do not")
     arm = completed_arm(robot, consistent_fit(export))
     near = "nearest to the robot's guesses" if robot.bodies else "of the least mass"
     note = [
