@@ -77,8 +77,8 @@ def same_along_logs(export, folder: Path) -> int:
                 for k, name in enumerate(joint.model.joints):
                     at = [j.name for j in robot.joints].index(name)
                     columns[:, :, at] = moved.q[:, k], moved.dq[:, k], moved.ddq[:, k]
-                noise = noise_model(export.catalogue.select(FilterNoise, joint=joint.name)[0], joint.joint, 1.0 / m.rate,
-                                    export.study.settings.q_tau)  # fmt: skip
+                [tuned], q_tau = export.catalogue.select(FilterNoise, joint=joint.name), export.study.settings.q_tau
+                noise = noise_model(tuned, joint.joint, 1.0 / m.rate, q_tau)
                 start = joint.filter["initial_std"]
                 passes = [ekf.track(part._replace(initial_std=start), noise) for part in filter_inputs(m)]
                 rows = []

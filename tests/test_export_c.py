@@ -109,6 +109,7 @@ def test_gravity_and_friction_are_limited_to_the_largest_effort_recorded(tmp_pat
     for q in (0.5, -1.5):
         assert abs(compiled.call("gravity", 0, (q, 0, 0))[1]) == 0.02
     assert compiled.call("friction", 0, (0.5, 0, 0), (1.0, 0, 0), state=True)[1] == 0.02
+    assert compiled.call("friction", 0, (-1.5, 0, 0), (-1.0, 0, 0), state=True)[1] == 0.0  # the model's would drive
 
 
 def test_bad_input_changes_nothing_and_a_gap_restarts(model):

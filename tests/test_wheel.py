@@ -62,7 +62,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     assert held == wanted
     assert {"davinci_forces/py.typed", "davinci_forces/simulation/shipped/davinci-joints.toml"} <= held
     suffixes = {Path(name).suffix for name in held}
-    assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed"}
+    assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed", ".json", ".c", ".h"}
 
 
 @pytest.mark.medium
