@@ -64,7 +64,8 @@ def fit_of(model, structure: str, theta: np.ndarray, estimator: str = "ridge") -
     std = 0.1 * np.abs(theta)
     return Fit(
         group=model.group, model=model.name, estimator=estimator, structure=structure, cutoff=(10.0,) * m,
-        effort_lag=(0.0,) * m, logs=("one",), samples=1, periods=1, mse=0.0, r2=1.0, condition=1.0, correlated_lags=1,
+        effort_lag=(0.0,) * m, logs=("one",), samples=1, periods=1, mse=0.0, mse_std=0.0, r2=1.0, r2_std=0.0,
+        condition=1.0, correlated_lags=1,
         parameter=names, phi=phi, unit=unit, scale=scale, positive=positive, theta=theta, theta_std=std,
         theta_std_noise=std, theta_std_model=std, theta_std_classical=std,
     )  # fmt: skip
