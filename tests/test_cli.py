@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 import davinci_forces
-from davinci_forces import commands
+from davinci_forces import __version__, commands
 from davinci_forces.cli import app
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.runner import ALL, runs
@@ -46,7 +45,7 @@ def finished(analysed, tmp_path) -> Path:
 
 
 def test_the_version_is_that_of_the_package():
-    assert call("--version") == f"davinci-forces {version('davinci-forces')}\n"
+    assert call("--version") == f"davinci-forces {__version__}\n"
 
 
 @pytest.mark.parametrize("name", EVERY)

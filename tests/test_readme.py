@@ -198,6 +198,8 @@ def test_the_version_to_be_cited_is_the_package_s():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"(version {version})" in README
     assert f"version = {{{version}}}" in README
+    newest = re.search(r"^### (\S+)", README.partition("## Changelog")[2], re.M)[1]
+    assert newest == version == davinci_forces.__version__ == "0.2.0.dev0"
 
 
 WORD = {"source": r"(?:found|table-6\.1|table-6\.1-corrected)"}  # the words of keys that may hold a dot

@@ -1,6 +1,7 @@
 """The package as others install it: from a wheel, in an environment and a folder that know nothing of the checkout."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from davinci_forces.runner.fingerprints.code import package_fingerprint
 from tests.conftest import ROOT
 
 Run = Callable[..., str]
@@ -62,7 +64,9 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     assert held == wanted
     assert {"davinci_forces/py.typed", "davinci_forces/simulation/shipped/davinci-joints.toml"} <= held
     suffixes = {Path(name).suffix for name in held}
-    assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed", ".json", ".c", ".h"}
+    assert suffixes == {
+        ".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".bib", ".typed", ".json", ".c", ".h",
+    }  # fmt: skip
 
 
 @pytest.mark.medium
@@ -86,6 +90,13 @@ def test_a_pipeline_of_the_user_s_hides_nothing_and_is_not_hidden(installed, tmp
     assert run(python, "-c", empty, cwd=installed) == "None\n"
 
 
+@pytest.mark.medium
+def test_the_code_of_a_wheel_has_the_fingerprint_of_the_checkout(installed, tmp_path):
+    code = "from davinci_forces.runner.fingerprints.code import package_fingerprint; print(package_fingerprint())"
+    assert run(next(installed.glob("python*")), "-c", code, cwd=tmp_path).strip() == package_fingerprint()
+    assert re.fullmatch("[0-9a-f]{12}", package_fingerprint())
+
+
 @pytest.mark.slow
 def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installed, tmp_path):
     program = installed / "davinci-forces"
@@ -96,6 +107,6 @@ def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installe
     run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)
     assert {file.name for file in (tmp_path / "reports" / "joints").iterdir()} == {
         "report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt", "summary.json",
-        "manifest.txt",
+        "manifest.txt", "references.bib",
     }  # fmt: skip
     assert "are unchanged" in run(program, "verify", "raw/joints", cwd=tmp_path)

@@ -8,7 +8,8 @@ if TYPE_CHECKING:
 
     from davinci_forces.robots.robot import Robot
 
-__all__ = ["read", "results", "robot", "run"]
+__all__ = ["__version__", "read", "results", "robot", "run"]
+__version__ = "0.2.0.dev0"
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":

@@ -276,7 +276,8 @@ def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue
     def told(about: Context) -> set[str | None]:
         return {block.label for block in walk(written("methods", about)) if isinstance(block, Equation)}
 
-    every = {"motor", "averaging", "differentiation", "estimation", "model", "innovation", "correction"}
+    every = {"motor", "averaging", "differentiation", "estimation", "choice-error", "model", "innovation", "correction"}
+    every |= {"band", "detection", "weighing", "tissue-law"}
     assert told(context(lab, catalogue)) == every
     assert told(context(lab, without(catalogue, Track))) == every - {"model", "innovation", "correction"}
     assert told(context(lab, without(catalogue, *KINDS.values()))) == set()

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from davinci_forces import __version__
 from davinci_forces.exports import FORMATS
 from davinci_forces.runner.console import echo
 
@@ -62,7 +63,7 @@ def _permitted(folders: Any, joints: list[str], despite_verdict: bool) -> Any:
     from davinci_forces.report.results import MANIFEST, identity
     from davinci_forces.runner import reporting
     from davinci_forces.runner.ledger import Ledger
-    from davinci_forces.runner.plan import VERSION, Plan
+    from davinci_forces.runner.plan import Plan
     from davinci_forces.runner.results import campaign
     from davinci_forces.study import reading
     from davinci_forces.study.review import STUDY
@@ -70,7 +71,7 @@ def _permitted(folders: Any, joints: list[str], despite_verdict: bool) -> Any:
     study, ledger = reading.read(folders.raw), Ledger(folders)
     catalogue = reporting.catalogue(ledger, Plan(study, ledger).places().find(tuple(KINDS.values())))
     verdicts = {j["joint"]: j["verdict"] for j in campaign.read_summary(folders.reports / "summary.json")["joints"]}
-    origin = ExportOrigin(VERSION, identity(read_bytes(folders.reports / MANIFEST)), verdicts)
+    origin = ExportOrigin(__version__, identity(read_bytes(folders.reports / MANIFEST)), verdicts)
     export = export_of(study, catalogue, origin, joints)
     reasons = [f"joint {j.name} has the verdict Problem" for j in export.joints if verdicts.get(j.name) == "bad"]
     used = {STUDY: {""}, "run": {log for fit, _ in export.fits.values() for log in fit.logs}}

@@ -17,6 +17,7 @@ class Provenance:
     processed: dict[str, str]
     failures: dict[str, str]
     study: str = ""  # text of the study file
+    code: str = ""  # fingerprint of the package's code
 
 
 class Catalogue:

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 
+from davinci_forces.records import LogSummary
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.answer import answer, digest
 from davinci_forces.report.changes import StatedValue
@@ -11,6 +12,7 @@ from davinci_forces.report.content import Document, Rated, Section, name_of, wal
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import MANIFEST, collect, identity, manifest
 from davinci_forces.report.sections import DOCUMENTS, section_builder
+from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.writers import render_all
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
@@ -30,7 +32,7 @@ def write_report(
     numbers["summary.json"] = digest(context)
     listed = manifest(provenance, numbers)
     report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
-    edition = f"report ID {report_id} · davinci-forces {provenance.version}"
+    edition = f"report ID {report_id} · davinci-forces {provenance.version}, code {provenance.code}{dates(catalogue)}"
     rated = Rated(results, report_id, tuple(log.name for log in study.logs), ratings)
     documents = tuple(
         Document(
@@ -46,7 +48,13 @@ def write_report(
         for name, (title, content) in built.items()
         if content
     )
-    return render_all(documents) | numbers | {MANIFEST: listed}
+    return render_all(documents) | numbers | {MANIFEST: listed, "references.bib": bibliography().encode()}
+
+
+def dates(catalogue: Catalogue) -> str:
+    """The dates of the data, as the logs give them; "" if none does."""
+    days = sorted(summary.started[:10] for summary in catalogue.records(LogSummary) if summary.started)
+    return f" · data of {' to '.join(dict.fromkeys((days[0], days[-1])))}" if days else ""
 
 
 def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:

@@ -8,16 +8,17 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
+from davinci_forces import __version__
 from davinci_forces.files import digest, read_bytes, text_of, write_together
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, error_message, without_folders
-from davinci_forces.runner.fingerprints.code import code
+from davinci_forces.runner.fingerprints.code import code, package_fingerprint
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.places import Located
-from davinci_forces.runner.plan import VERSION, Plan, Task
+from davinci_forces.runner.plan import Plan, Task
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
@@ -34,11 +35,12 @@ def task(plan: Plan) -> Task:
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
-        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)},
+        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)}
+        | {"package": package_fingerprint()},
         settings=asdict(study.settings),
         schemas={},
         code=code("davinci_forces.report.report", "davinci_forces.records.store"),
-        version=VERSION,
+        version=__version__,
     )
     return Task(REPORT, REPORT, fingerprint, {"records": located}, {"study": study})
 
@@ -109,7 +111,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
     failures = {" ".join([*entry.stage.split("."), entry.task]): entry.failed for entry in failed}
     text = text_of(read_bytes(study.folder / "study.toml"), errors="replace")
-    return Provenance(study.name, VERSION, versions(), raw, processed, failures, text)
+    return Provenance(study.name, __version__, versions(), raw, processed, failures, text, package_fingerprint())
 
 
 def versions() -> dict[str, str]:

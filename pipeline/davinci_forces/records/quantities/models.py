@@ -76,7 +76,6 @@ MODELS = {
     "value": Quantity("measured value", "{unit}"),
     # periods and noise
     "period": Quantity("length of one period", "s"),
-    "period_std": Quantity("standard error of the period", "s"),
     "stated_period": Quantity("length of one period as the study states it; 0 where it does not", "s"),
     "periods": Quantity("number of periods averaged, M"),
     "t_start": Quantity("time of the first sample that is averaged", "s"),
@@ -151,7 +150,6 @@ MODELS = {
     "parameters": Quantity("number of parameters"),
     "physical": Quantity("1 when the inertia is positive definite along the trajectories, else 0"),
     "score": Quantity("relative error on left-out blocks of the path, mean over joints"),
-    "score_std": Quantity("standard error of the score"),
     "training": Quantity("relative error of the fit to all data, mean over joints"),
     "over_periods": Quantity("relative error on left-out repetitions of the period, mean over joints"),
     # the model of a joint along a log
@@ -175,9 +173,7 @@ MODELS = {
     "fit_percent": Quantity("100 % minus the error relative to the effort's deviation from its mean", "%"),
     "r2_ceiling": Quantity("R2 of a model without error, given the noise of the effort"),
     "model_error": Quantity("root mean square of the model's low-passed error, without noise", "{effort}"),
-    "model_error_std": Quantity("standard error of the model's error", "{effort}"),
     "mean_error": Quantity("mean of the measured minus the predicted effort, as of another payload", "{effort}"),
-    "mean_error_std": Quantity("standard error of that mean", "{effort}"),
     "effort_rms": Quantity("root mean square of the effort after the low-pass filter", "{effort}"),
     "relative_error": Quantity("norm of the error over the norm of the effort, after the same low-pass filter"),
     "relative_error_1111": Quantity("relative error over the first 1111 samples"),

@@ -51,8 +51,8 @@ def blocks(context: Context) -> Iterator[Block]:
         yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
-        yield comparison(context, comparisons)
-        yield OnScreen("Filters compared over time", "filters-over-time", (overlay(comparisons),))
+        compared = comparison(context, comparisons), overlay(comparisons)
+        yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
 
 
 def worst_track(context: Context, joint: str) -> Iterator[Track]:

@@ -45,8 +45,8 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield from paper_or_screen(
         Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrrr")
     )
-    yield from estimators(context, predictions)
-    yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
+    scores = (*estimators(context, predictions), every_score(context, predictions))
+    yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
     joints = dict.fromkeys(p.joint for p in used)
     unseen = [p for p in used if p.role != "identification"] or used
     worst = [

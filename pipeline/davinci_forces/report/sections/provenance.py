@@ -22,11 +22,11 @@ def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     provenance, study = context.provenance, context.study
     yield Prose(
-        f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 of "
-        "`manifest.txt`. This file lists raw files, study file, processed files and numbers, each with its own "
-        "SHA-256. Two reports with the same ID have the same content. `davinci-forces verify --id` checks whether "
-        "the study and its report have a given ID. Every number of the tables is in `results.json` under its own key, "
-        "with the processed file and the field that it comes from."
+        f"Made by davinci-forces {provenance.version}; the SHA-256 of its files begins with {provenance.code}. The "
+        "report ID on page one is the first half of the SHA-256 of `manifest.txt`. This file lists raw files, study "
+        "file, processed files and numbers, each with its own SHA-256. Two reports with the same ID have the same "
+        "content. `davinci-forces verify --id` checks whether the study and its report have a given ID. Every number "
+        "is in `results.json` under its own key, with the processed file and the field that it comes from."
     )
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."

@@ -1,5 +1,6 @@
 """Hashes of the code that a result depends on: modules and all modules of the pipeline that they import."""
 
+import hashlib
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -10,6 +11,14 @@ from davinci_forces.files import digest
 PACKAGE = Path(__file__).parents[2]
 IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 COMMENT = re.compile(r"#.*")
+
+
+@cache
+def package_fingerprint() -> str:
+    """The fingerprint of the package's code, 12 digits: the same from a wheel and from a checkout."""
+    files = (file for file in PACKAGE.rglob("*") if file.is_file() and file.suffix != ".pyc")
+    listed = sorted(f"{digest(file)}  {file.relative_to(PACKAGE).as_posix()}\n" for file in files)
+    return hashlib.sha256("".join(listed).encode()).hexdigest()[:12]
 
 
 @cache

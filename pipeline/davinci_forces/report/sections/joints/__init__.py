@@ -76,7 +76,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     yield from unidentified_parameters(context, joint)
     yield from implausible([used] if used is not plain else fits, joint)
     yield from left_out(context, joint)
-    yield comparison(context, fits, plain)
+    yield comparison(context, fits)
 
 
 def of_joint(fit: Fit, joint: str) -> list[int]:
@@ -191,8 +191,8 @@ def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
     return tuple(tables)
 
 
-def comparison(context: Context, fits: list[Fit], plain: Fit) -> Block:
-    """The joint by itself: parameters of all fits side by side, how well each describes the data, and its residual."""
+def comparison(context: Context, fits: list[Fit]) -> Block:
+    """The joint by itself: parameters of all fits side by side, and how well each describes the data."""
     names = list(dict.fromkeys(name for fit in fits for name in fit.parameter))
     rows: list[tuple[Cell, ...]] = []
     for fit in fits:
@@ -208,10 +208,7 @@ def comparison(context: Context, fits: list[Fit], plain: Fit) -> Block:
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
     first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
-    residuals = context.catalogue.select(Residual, joint=group, model=plain.model, estimator=plain.estimator)
-    beside = context.used_record(group) is not None  # so that its residual is not shown above
     more = (
-        *(block for residual in residuals if beside for block in residual_blocks(context, residual, "-plain")),
         *estimators(context, first),
         *printed_beside(context, first),
         *convergence(context, group),

@@ -22,9 +22,9 @@ ADVICE = {
 ALL_TRIED = "No term that was tried for the choice of the model removes this."
 
 
-def residual_blocks(context: Context, residual: Residual, label_end: str = "") -> Iterator[Block]:
+def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     """The residual of a fit in one log: over time, against the motion, and its autocorrelation."""
-    name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}{label_end}"
+    name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
     yield Figure(
