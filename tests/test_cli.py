@@ -193,7 +193,7 @@ def test_every_stage_runs_where_none_is_named(finished):
 @pytest.mark.medium
 def test_results_are_read_by_key_with_what_is_known_of_their_error(analysed):
     frame = davinci_forces.results(analysed)
-    assert list(frame.columns) == ["value", "std", "unit", "source"]
+    assert list(frame.columns) == ["value", "std", "unit", "source", "std_reason"]
     assert frame.loc["period.roll", "value"] == pytest.approx(2.0, abs=5 * frame.loc["period.roll", "std"])
     assert frame.loc["period.roll", "unit"] == "s"
     assert pd.isna(frame.loc["log.roll.rows", "std"])

@@ -66,7 +66,7 @@ TIERS = (
     ("logs", "records", "robots"),
     ("maths", "toml"),
     ("files",),
-    ("errors",),
+    ("errors", "version"),
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
 MATHS = (

@@ -224,17 +224,12 @@ if __name__ == "__main__":
     main()
 """
 DRAWING = """
-from davinci_forces.report.figures import together
 from davinci_forces.report import writers
-together.MIN_FIGURES_PER_PROCESS = 1
-draw, typeset = together._draw, writers.renderer
-def say_and_draw(figures):
-    print("draws", flush=True)
-    draw(figures)
+typeset = writers.renderer
 def say_and_render(ending):
     print("drawn", flush=True)
     return typeset(ending)
-together._draw, writers.renderer = say_and_draw, say_and_render
+writers.renderer = say_and_render
 """
 STOPPED = "stopped; run again to continue\n"
 
@@ -332,9 +327,9 @@ def test_a_run_that_is_stopped_says_so_in_one_line_and_goes_on_next_time(raw, be
 
 @LINUX
 @pytest.mark.medium
-@pytest.mark.parametrize(("figures", "how"), [(True, "SIGINT"), (True, "SIGTERM"), (False, "SIGINT"), (False, "twice")])
-def test_a_report_that_is_stopped_leaves_nobody_that_draws_and_no_half_page(raw, begin, done, figures, how):  # noqa: F811
-    """While other processes draw figures, or while threads set pages, which cannot be ended."""
+@pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "twice"])
+def test_a_report_that_is_stopped_leaves_no_half_page(raw, begin, done, how):  # noqa: F811
+    """While threads set pages, which cannot be ended."""
     folder = small(raw / "lab", ("one",))
     for where, made in ((processed(folder), done[0]), (reports(folder), done[1])):
         for name, content in made.items():
@@ -344,7 +339,7 @@ def test_a_report_that_is_stopped_leaves_nobody_that_draws_and_no_half_page(raw,
         page.unlink()
     run = begin("all", str(folder), first=DRAWING)
     line = run.stdout.readline()
-    while line and not line.startswith("drawn" if not figures else "draws"):
+    while line and not line.startswith("drawn"):
         line = run.stdout.readline()
     assert stopped(run, how) == (STOPPED, HOW[how])
     assert not partial_files(raw.parent)

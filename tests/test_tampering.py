@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import multiprocessing.util
 import re
 import shutil
 from contextlib import suppress
@@ -263,7 +264,8 @@ def test_a_printed_page_tells_a_report_that_was_forged_with_all_its_files(finish
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch) -> Path:
-    """Where temporary folders are made."""
+    """Where temporary folders are made; the sockets of processes stay where paths are short enough for them."""
+    multiprocessing.util.get_temp_dir()
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
@@ -407,7 +409,7 @@ def test_the_id_on_the_page_is_the_hash_of_a_manifest_of_all_files(finished):  #
     root = finished.parent.parent
     assert {name: digest(root / name) for name in listed} == listed
     records = {file.relative_to(root).as_posix() for file in processed(finished).rglob("*.parquet")}
-    pages = {"report.html", "report.pdf", "robot.html", "robot.pdf", "manifest.txt"}
+    pages = {"report.html", "report.pdf", "robot.html", "robot.pdf", "manifest.txt", "references.bib"}
     made = {f.relative_to(root).as_posix() for f in reports(finished).iterdir() if f.name not in pages}
     raw = {f"raw/lab/{file.name}" for file in finished.iterdir()}
     assert {*listed} == records | made | raw

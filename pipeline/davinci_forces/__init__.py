@@ -3,13 +3,15 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from davinci_forces.version import VERSION
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from davinci_forces.robots.robot import Robot
 
-__all__ = ["__version__", "read", "results", "robot", "run"]
-__version__ = "0.2.0.dev0"
+__all__ = ["read", "results", "robot", "run"]
+__version__ = VERSION
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":

@@ -5,6 +5,7 @@ import re
 import shutil
 from datetime import date, timedelta
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
-from davinci_forces.maths.estimation.drift import holm, outlier_probabilities, scatter, trend
+from davinci_forces.maths.estimation.drift import control_limits, holm, outlier_probabilities, scatter, trend
 from davinci_forces.report.content import literal
 from davinci_forces.report.content.inline import Span, parse
 
@@ -106,6 +107,43 @@ def test_a_study_that_stands_out_is_named_and_makes_no_drift(tmp_path):
     said = findings(tmp_path)
     assert [text for text in said if "run-11 stands out" in text and "inertia" in text]
     assert not [text for text in said if "drifts" in text]
+
+
+def test_joints_of_two_robots_share_nothing_but_a_name(tmp_path):
+    """Alone, each robot's numbers agree; together, they would vary beyond their errors."""
+    studies = lab(tmp_path, 8, lambda i, key: 0.5 * (i % 2))
+    call("campaign", *studies)
+    assert "varies" in " ".join(findings(tmp_path))
+    for study in studies[1::2]:
+        summary = tmp_path / "reports" / study.name / "summary.json"
+        summary.write_text(summary.read_text().replace('"robot": "arm"', '"robot": "other"'))
+    call("campaign", *studies)
+    assert findings(tmp_path) == []
+    headings = re.findall(r"<h2[^>]*>(.*?)</h2>", page(tmp_path), re.S)
+    for heading in ("Hand roll, arm", "Hand roll, other", "Instrument slide, arm", "Instrument slide, other"):
+        assert any(heading in text for text in headings), headings
+
+
+def test_a_chart_has_dates_and_limits_that_values_in_control_keep(tmp_path):
+    call("campaign", *lab(tmp_path, 12))
+    text = unquote(page(tmp_path))
+    assert re.search(r"01-\d\d", text)
+    assert "2024" in text
+    assert "control limits: 99.7 %" in text
+
+
+def test_control_limits_hold_as_many_values_as_they_say():
+    random, std, inside = np.random.default_rng(5), np.linspace(0.5, 2.0, 8), []
+    for _ in range(2000):
+        x, further = 3.0 * std * random.normal(size=(2, 8))  # so that the scatter widens the limits
+        centre, width = control_limits(x, std, 0.9)
+        inside.append(np.mean(np.abs(further - centre) <= width))
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.01)
+    equal, x = np.ones(1000), random.normal(size=1000)
+    centre, width = control_limits(x, equal, 0.9973)
+    assert centre == pytest.approx(x.mean())
+    assert_allclose(width, 3.0 * max(x.std(ddof=1), 1.0), rtol=0.01)  # Shewhart's
+    assert_allclose(control_limits(x, 0.5 * equal, 0.9973)[1], 3.0 * x.std(ddof=1), rtol=0.01)  # of the scatter
 
 
 def test_without_dates_the_order_is_that_of_the_list(tmp_path):

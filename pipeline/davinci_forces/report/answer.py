@@ -8,7 +8,8 @@ from typing import Any
 from davinci_forces.records import LogSummary, Stiffness
 from davinci_forces.report.content.inline import parse
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, trust, trust_row
+from davinci_forces.report.sections.parts import trust
+from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, trust_row
 from davinci_forces.report.sections.tissue import verdict
 
 HEADER = ("joint", "verdict", "new path", "model error", "error/effort", "R2", "ceiling", "detection level", "coverage")

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc, stdtr
+from scipy.special import chdtrc, stdtr, stdtrit
 
 from davinci_forces.maths.arrays import Array, Booleans
 
@@ -62,6 +62,18 @@ def outlier_probabilities(x: Array, std: Array) -> Array:
         spread = float(np.sqrt(birge * (std[i] ** 2 + 1.0 / w.sum())))
         p[i] = two_sided((x[i] - mean) / spread, len(others) - 1)
     return p
+
+
+def control_limits(x: Array, std: Array, inside: float) -> tuple[float, Array]:
+    """Weighted mean of values (n,), and distance (n,) that a share `inside` of further values in control keeps from it.
+
+    The distance, at each error, is Student's quantile with n - 1 degrees of freedom times the standard deviation of the
+    difference; errors are widened as the values scatter.  Shewhart's chart has equal errors, and n without end.
+    """
+    w = std**-2
+    mean = float(np.average(x, weights=w))
+    birge = max(float(np.sum(w * (x - mean) ** 2)) / (len(x) - 1), 1.0)
+    return mean, stdtrit(len(x) - 1, 0.5 + 0.5 * inside) * np.sqrt(birge * (std**2 + 1.0 / w.sum()))
 
 
 def two_sided(z: float, freedom: int) -> float:

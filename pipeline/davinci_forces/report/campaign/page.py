@@ -4,13 +4,25 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.report.campaign.studies import FLOORS, CampaignStudy, Findings, Series, joints_of, series_key
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.estimation.drift import MIN_VALUES_TREND, control_limits
+from davinci_forces.report.campaign.studies import (
+    FLOORS,
+    CampaignStudy,
+    Findings,
+    Series,
+    by_robot,
+    joints_of,
+    series_key,
+)
 from davinci_forces.report.content import (
+    Band,
     Block,
     Bullets,
     Cell,
     Document,
     Figure,
+    HLine,
     Number,
     Panel,
     Points,
@@ -26,12 +38,19 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.verdicts import band, verdict_words
 from davinci_forces.report.writers import render_all
 
+INSIDE_LIMITS = 0.9973  # of values in control: three standard deviations of a normal distribution
+
 
 def render_campaign(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings: Findings) -> dict[str, bytes]:
     """campaign.html and campaign.pdf of studies in their order; `left_out` names those that have no results."""
+    robots = by_robot(studies)
     sections = (
         Section("The campaign", "campaign", tuple(overview(studies, left_out, findings))),
-        *(joint_section(joint, studies, findings) for joint in joints_of(studies)),
+        *(
+            joint_section(joint, same, findings, f"{i}-{joint}" if i else joint, len(robots) > 1)
+            for i, same in enumerate(robots.values())
+            for joint in joints_of(same)
+        ),
     )
     simulated = any(study.simulated for study in studies)
     heading = "1 study" if len(studies) == 1 else f"{len(studies)} studies"
@@ -61,15 +80,17 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
         yield Bullets(messages)
     else:
         yield Verdict("good", "No number drifts, varies or stands out beyond its standard errors.")
-    joints = joints_of(studies)
-    rows = tuple((date(study), study.link, *(word(study, joint) for joint in joints)) for study in studies)
-    header = ("Recorded", "Study", *map(title, joints))
-    yield Table("The verdict of every joint in every study.", header, rows, "campaign-studies", "l" * len(header))
+    for i, (robot, same) in enumerate(by_robot(studies).items()):
+        joints = joints_of(same)
+        rows = tuple((date(study), study.link, *(word(study, joint) for joint in joints)) for study in same)
+        header, caption = ("Recorded", "Study", *map(title, joints)), "the verdict of every joint in every study."
+        label = f"campaign-studies{f'-{i + 1}' if i else ''}"
+        yield Table(f"{literal(robot)}: {caption}", header, rows, label, "l" * len(header))
 
 
 def change_in_words(series: Series, findings: Findings) -> str:
     """State how a number drifts or varies."""
-    name = f"**{title(series.joint)}, {literal(words(series.name))}**"
+    name = f"**{where(series)}**"
     if line := findings.slopes.get(series_key(series)):
         slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
@@ -80,8 +101,12 @@ def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
     """State the studies that stand out."""
     for i in findings.stand_out(series):
         shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
-        where = f"{title(series.joint)}, {literal(words(series.name))}"
-        yield f"{series.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
+        yield f"{series.studies[i].link} stands out: **{where(series)}** is {literal(str(shown))}."
+
+
+def where(series: Series) -> str:
+    """The joint and the number."""
+    return f"{title(series.joint)}, {literal(words(series.name))}"
 
 
 def date(study: CampaignStudy) -> str:
@@ -99,29 +124,33 @@ def word(study: CampaignStudy, joint: str) -> str:
     return verdict_words(verdict.verdict, verdict.same_path, narrow)
 
 
-def joint_section(joint: str, studies: Sequence[CampaignStudy], findings: Findings) -> Section:
-    """The numbers of one joint, drawn and listed."""
-    of_joint = [series for series in findings.every if series.joint == joint]
+def joint_section(
+    joint: str, studies: Sequence[CampaignStudy], findings: Findings, label: str, names_robot: bool
+) -> Section:
+    """The numbers of one joint of the robot of these studies, drawn and listed."""
+    of_joint = [series for series in findings.every if (series.robot, series.joint) == (studies[0].robot, joint)]
     names = list(dict.fromkeys(series.name for series in of_joint))
     changed = sorted({series.name for series in of_joint if findings.has_change(series)})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
     figure = Figure(
-        f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. Studies that "
-        "stand out are named.",
+        f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. The line is "
+        f"the weighted mean; grey are its control limits: {100 * INSIDE_LIMITS:.1f} % of further values in control are inside. "
+        "Studies that stand out are named.",
         f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}.",
         tuple(panel(series, findings) for series in drawn),
-        f"campaign-{joint}",
+        f"campaign-{label}",
         columns=2,
         height=34,
     )
     floors = [name for name in names if name in FLOORS.values()]
     parameters = [name for name in names if name not in floors]
     tables = (
-        table(joint, "parameters", "parameters", parameters, of_joint, studies),
-        table(joint, "measures of trust", "floors", floors, of_joint, studies),
+        table(joint, "parameters", f"{label}-parameters", parameters, of_joint, studies),
+        table(joint, "measures of trust", f"{label}-floors", floors, of_joint, studies),
     )
-    return Section(title(joint), f"joint-{joint}", (*([figure] if drawn else []), *tables))
+    heading = f"{title(joint)}, {literal(studies[0].robot)}" if names_robot else title(joint)
+    return Section(heading, f"joint-{label}", (*([figure] if drawn else []), *tables))
 
 
 def table(
@@ -134,7 +163,7 @@ def table(
 ) -> Table:
     """Some numbers of a joint, one row a study."""
     keys = {(s.name, study.name): key for s in of_joint for study, key in zip(s.studies, s.keys, strict=True)}
-    verdict = label == "floors"
+    verdict = label.endswith("floors")
     rows = tuple(
         (
             date(study),
@@ -148,7 +177,7 @@ def table(
     heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
     header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
     align = ("lll" if verdict else "ll") + "r" * len(names)
-    return Table(f"{title(joint)}: {content}, in every study.", header, rows, f"campaign-{joint}-{label}", align)
+    return Table(f"{title(joint)}: {content}, in every study.", header, rows, f"campaign-{label}", align)
 
 
 def words(name: str) -> str:
@@ -169,12 +198,23 @@ def panel(series: Series, findings: Findings) -> Panel:
     t, out = findings.times(series), list(findings.stand_out(series))
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(series.std)
-    marks: list[AnyMark] = [Points(t[inside], series.value[inside], "", "blue", std[inside])] if inside else []
+    marks: list[AnyMark] = [*limits(series, t, inside)]
+    if inside:
+        marks.append(Points(t[inside], series.value[inside], "", "blue", std[inside]))
     if out:
         names = tuple(series.studies[i].name for i in out)
         marks.append(Points(t[out], series.value[out], "", "vermillion", std[out], names))
     unit = format_unit(series.unit)
-    x_label = "time [days from the first]" if findings.by_date else "study"
-    name = words(series.name)
+    name, label = words(series.name), "" if findings.by_date else "study"
     x_range = None if findings.by_date else (min(findings.time.values()) - 0.5, max(findings.time.values()) + 0.5)
-    return Panel(name, x_label, f"{name} [{unit}]" if unit else name, tuple(marks), x_range)
+    heading = f"{name} [{unit}]" if unit else name
+    return Panel(name, label, heading, tuple(marks), x_range, x_dates=findings.by_date)
+
+
+def limits(series: Series, t: Array, inside: list[int]) -> Iterator[AnyMark]:
+    """The weighted mean of the studies that do not stand out, and their control limits."""
+    if len(inside) < MIN_VALUES_TREND or not np.isfinite(series.std).all():
+        return
+    centre, width = control_limits(series.value[inside], series.std[inside], INSIDE_LIMITS)
+    yield Band(t[inside], centre - width, centre + width, "", "grey")
+    yield HLine(centre, "", "grey", "solid")

@@ -53,8 +53,9 @@ class CampaignStudy:
 
 
 class Series(NamedTuple):
-    """One number of a joint over the studies that have it, with the standard errors."""
+    """One number of a robot's joint over the studies that have it, with the standard errors."""
 
+    robot: str
     joint: str
     name: str
     unit: str
@@ -64,13 +65,25 @@ class Series(NamedTuple):
     std: Array  # NaN where none is stated
 
 
+def by_robot(studies: Sequence[CampaignStudy]) -> dict[str, list[CampaignStudy]]:
+    """The studies of each robot, in order."""
+    return {robot: [s for s in studies if s.robot == robot] for robot in dict.fromkeys(s.robot for s in studies)}
+
+
 def joints_of(studies: Sequence[CampaignStudy]) -> list[str]:
     """The joints with a verdict in any study, in order."""
     return list(dict.fromkeys(joint for study in studies for joint in study.joints))
 
 
+def every_series(studies: Sequence[CampaignStudy]) -> Iterator[Series]:
+    """Every number of every joint, robot by robot: joints of two robots have nothing in common but a name."""
+    for same in by_robot(studies).values():
+        for joint in joints_of(same):
+            yield from series_of(same, joint)
+
+
 def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
-    """Every parameter and measure of trust of a joint over the studies; numbers in other units are other series."""
+    """Every parameter and measure of trust of a joint over one robot's studies; other units are other series."""
     keyed: dict[tuple[str, str], list[tuple[CampaignStudy, str]]] = {}
     prefix = f"fit.{joint}.{FIT}."
     for study in studies:
@@ -84,11 +97,12 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
         numbers = [study.numbers[key] for study, key in places]
         value = np.array([number.number if number.number is not None else np.nan for number in numbers])
         std = np.array([number.std or np.nan for number in numbers])
-        yield Series(joint, name, unit, tuple(s for s, _ in places), tuple(k for _, k in places), value, std)
+        those, keys = zip(*places, strict=True)
+        yield Series(studies[0].robot, joint, name, unit, those, keys, value, std)
 
 
 DAY = 86400.0  # [s]
-Place = tuple[str, str, str]  # joint, name and unit of a series
+Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
 
 
 class Slope(NamedTuple):
@@ -104,7 +118,7 @@ class Findings:
 
     every: tuple[Series, ...]
     by_date: bool
-    time: Mapping[str, float]  # of each study [days from the first], or its number in order
+    time: Mapping[str, float]  # of each study [days since 1970], or its number in order
     slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of the series that drift
     varying: frozenset[Place] = frozenset()
     outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
@@ -130,5 +144,5 @@ class Findings:
 
 
 def series_key(one: Series) -> Place:
-    """Joint, name and unit, which identify a series."""
-    return one.joint, one.name, one.unit
+    """Robot, joint, name and unit, which identify a series."""
+    return one.robot, one.joint, one.name, one.unit

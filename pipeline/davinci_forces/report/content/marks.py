@@ -192,6 +192,7 @@ class Panel:
     y_range: tuple[float, float] | None = None
     x_log: bool = False
     y_log: bool = False
+    x_dates: bool = False  # x is in days since 1970, and the axis shows dates
 
 
 @dataclass(frozen=True, eq=False)

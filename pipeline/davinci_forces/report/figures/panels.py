@@ -159,6 +159,8 @@ def _with_axes(figure: Figure, place: int, width: float) -> PlacedPanel:
         y = Axis(n - 0.5, -0.5, log=False, label=panel.y_label).with_names(names)
     elif names:
         x = x.with_names(names)
+    elif panel.x_dates:
+        x = x.with_dates(FEW_X_STEPS)
     return PlacedPanel(panel.title, marks, x, y, plan_heading(panel.title, marks, width))
 
 

@@ -51,6 +51,15 @@ class Axis:
         places = tuple((values * scale).tolist())
         return replace(self, label=with_power(self.label, exponent), values=places, numbers=numbers)
 
+    def with_dates(self, most: int) -> "Axis":
+        """The axis with dates at whole days, or times at round hours; it is in days since 1970."""
+        values, step = round_values(self.low, self.high, most)
+        if step >= 1.0:
+            values = np.unique(np.round(values))
+        times = (np.datetime64("1970-01-01T00:00") + np.round(values * 1440).astype("timedelta64[m]")).tolist()
+        form = "%m-%d\n%Y" if step >= 1.0 else "%H:%M\n%Y-%m-%d"
+        return replace(self, values=tuple(values.tolist()), numbers=tuple(time.strftime(form) for time in times))
+
     def _with_decades(self) -> "Axis":
         """Numbers at 1, 2 and 5 of each decade, or at powers of ten on a long axis."""
         low, high = math.log10(self.low), math.log10(self.high)

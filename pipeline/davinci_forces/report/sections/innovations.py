@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, paper_or_screen, run_name
+from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_name
 
 UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the correlation
 FINDINGS = {  # from the best to the least known
@@ -30,6 +30,7 @@ FINDINGS = {  # from the best to the least known
     "mended": "white if tested causes are corrected",
     UNEXPLAINED: "not white, whatever tested cause is corrected",
 }
+PRINTED = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
@@ -54,7 +55,7 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         f"The filter's random walk is chosen to follow pushes{assumed}. In free motion this walk is larger than "
         "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
     )
-    yield from paper_or_screen(verdicts(context, explained))
+    yield verdicts(context, explained)
     drawn = [e for e in explained if is_worst(context, e)]
     drawn.sort(key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
@@ -103,11 +104,13 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
     within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
     return Table(
         "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
-        f"innovation over its stated variance, which is 1 if that variance is right.{within}",
+        f"innovation over its stated variance, which is 1 if that variance is right.{within} The PDF has the "
+        f"{PRINTED} runs with the smallest p-values.",
         ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict"),
         rows,
         "innovation-verdicts",
         "llrrl",
+        tuple(sorted(sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])[:PRINTED])),
     )
 
 

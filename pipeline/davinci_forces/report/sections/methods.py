@@ -6,10 +6,11 @@ from pathlib import Path
 from textwrap import fill
 
 from davinci_forces import records
+from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.summary import trust
+from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.verdicts import percent, thresholds
 
 SYMBOLS = (
@@ -167,7 +168,7 @@ def section(context: Context) -> Section:
 
 def bibliography() -> str:
     """The references as BibTeX, which stands beside the report."""
-    return BIBLIOGRAPHY.read_text(encoding="utf-8")
+    return text_of(read_bytes(BIBLIOGRAPHY))
 
 
 def reference(entry: str) -> str:

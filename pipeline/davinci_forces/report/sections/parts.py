@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import evenly
-from davinci_forces.records import Column, Prediction, Residual, Track, Whiteness
+from davinci_forces.records import Column, PathShare, Prediction, Residual, Track, Whiteness
 from davinci_forces.report.content import (
     AnyMark,
     Block,
@@ -22,6 +22,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.verdicts import Trust, decisive
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
@@ -59,6 +60,15 @@ def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int 
     yield from blocks[:number]
     if blocks[number:]:
         yield OnScreen(name, anchor, tuple(blocks[number:]))
+
+
+def trust(context: Context, joint: str) -> Trust:
+    """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
+    fits = context.predicting_fits(joint)
+    scored = [p for p in context.catalogue.select(Prediction, joint=joint) if f"{p.model}.{p.estimator}" in fits]
+    scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
+    run, about = decisive(scored, context.catalogue.select(PathShare, joint=joint))
+    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
 
 
 def run_name(log: str, joint: str) -> str:

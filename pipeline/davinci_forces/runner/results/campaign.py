@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -22,9 +23,8 @@ from davinci_forces.report.campaign.studies import (
     Place,
     Series,
     Slope,
-    joints_of,
+    every_series,
     series_key,
-    series_of,
 )
 from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
@@ -55,8 +55,7 @@ def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tu
     summaries = [read_study(folder, place) for folder in finished]
     by_date = all(study.when is not None for study in summaries)
     ordered = sorted(summaries, key=lambda study: study.started) if by_date else summaries
-    series = [row for joint in joints_of(ordered) for row in series_of(ordered, joint)]
-    files = render_campaign(ordered, left_out, findings(series, ordered, by_date))
+    files = render_campaign(ordered, left_out, findings([*every_series(ordered)], ordered, by_date))
     for name, content in files.items():
         write_bytes(place / name, content)
     return [place / name for name in files], left_out
@@ -137,11 +136,7 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
 
 
 def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:
-    """The date of each study [days from the first], or its number in order."""
-    first = studies[0].when if studies else None
-    return {
-        study.name: (study.when - first).total_seconds() / DAY
-        if by_date and first is not None and study.when is not None
-        else float(i)
-        for i, study in enumerate(studies, 1)
-    }
+    """The date of each study [days since 1970], or its number in order."""
+    if by_date:
+        return {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
+    return {study.name: float(i) for i, study in enumerate(studies, 1)}

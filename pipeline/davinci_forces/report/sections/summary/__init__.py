@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, PathShare, Prediction, Record, Track
+from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track
 from davinci_forces.report.content import (
     Block,
     Bullets,
@@ -23,8 +23,10 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary.opening import (
     as_list,
+    logs_in_words,
     measurements,
     nothing_identified,
     sign_off,
@@ -37,7 +39,6 @@ from davinci_forces.report.verdicts import (
     GOOD,
     Trust,
     band_in_words,
-    decisive,
     is_mostly_constant,
     percent,
 )
@@ -61,6 +62,7 @@ def blocks(context: Context) -> Iterator[Block]:
     if lines := measurements(context):
         yield Bullets(lines)
     if not trusts:
+        yield Prose(logs_in_words(context))
         yield from nothing_identified(context)
         yield sign_off(context)
         return
@@ -105,24 +107,15 @@ def fitted_joints(context: Context) -> list[str]:
     return list(dict.fromkeys(fit.group for fit in context.own_fits()))
 
 
-def trust(context: Context, joint: str) -> Trust:
-    """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
-    fits = context.predicting_fits(joint)
-    scored = [p for p in context.catalogue.select(Prediction, joint=joint) if f"{p.model}.{p.estimator}" in fits]
-    scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
-    run, about = decisive(scored, context.catalogue.select(PathShare, joint=joint))
-    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
-
-
 def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
-    kind = "simulated " if context.study.simulated else ""
     logs = len({track.log for track in context.catalogue.records(Track)})
     windows = sum(len(contact) for contact in contacts)
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
-        f"on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the {literal(context.study.robot.title)}."
+        f"on {count(len(trusts), 'joint')} in {count(logs, 'log')} of the {literal(context.study.robot.title)}. "
+        f"{logs_in_words(context)}"
     )
     if not windows:
         return f"{text} No contact is measured, as the study states no contact windows."

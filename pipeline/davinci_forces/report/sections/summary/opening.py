@@ -12,6 +12,14 @@ from davinci_forces.report.sections.parts import RATINGS
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
+USES = {  # what the logs of each role are for
+    "identification": "to identify the model",
+    "validation": "to test it on",
+    "contact": "with contact",
+    "weight": "with an attached mass",
+    "friction": "to map friction",
+    "tissue": "of pushes on tissue",
+}
 MAX_MEASURED = 3  # masses and stiffnesses on page one
 MAX_NAMED = 3  # joints that a clause of the verdict names
 TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject"
@@ -81,6 +89,15 @@ def stiffnesses(context: Context) -> Iterator[str]:
         quartiles = f", quartiles {low} and {high}" if log.pushes > 1 else ""
         used = f" ({log.pushes} of {len(log)} pushes)"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
+
+
+def logs_in_words(context: Context) -> str:
+    """State what the logs are for, by their roles."""
+    roles = [log.role for log in context.study.logs]
+    uses = [f"{roles.count(role)} {use}" for role, use in USES.items() if role in roles]
+    *most, last = uses
+    kind = "Simulated logs" if context.study.simulated else "Logs"
+    return f"{kind} of this study: {', '.join(most)} and {last}." if most else f"{kind} of this study: {last}."
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
