@@ -16,7 +16,7 @@ READY_TO_TEST := .venv/ready-to-test
 READY_TO_CHECK := .venv/ready-to-check
 READY_TO_COMPARE := .venv/ready-to-compare
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
-INSTALL := $(PIP) install --require-hashes --no-deps
+INSTALL := $(BIN)/python .ci/install.py
 # A file's tests share what they analyse and compile, so a file stays in one process.  Processes share the bytecode of
 # the package, without which each of them takes seconds more to begin.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
@@ -79,6 +79,7 @@ bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, agai
 
 locks: ## pin anew what the project needs, by uv (UPGRADE=--upgrade for newer versions)
 	$(LOCK) $(UPGRADE) pyproject.toml --group build -o requirements.lock
+	$(LOCK) $(UPGRADE) --group install -o .ci/install.lock
 	$(LOCK) $(UPGRADE) --group test -c requirements.lock -o tests/test.lock
 	$(LOCK) $(UPGRADE) --group check -c requirements.lock -o tests/check.lock
 	$(LOCK) $(UPGRADE) --group oracles -c requirements.lock -o tests/oracles.lock
@@ -104,19 +105,19 @@ $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { echo "Python cannot make environments here; on Debian and Ubuntu run: apt-get install python3-venv"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(INSTALL) -r requirements.lock
+	$(INSTALL) requirements.lock
 	@$(BIN)/python -c "$$FORGET"
 	$(PIP) install --no-deps --no-build-isolation -e .
 	@touch $@
 
 $(READY_TO_TEST): $(READY) tests/test.lock
-	$(INSTALL) -r tests/test.lock
+	$(INSTALL) tests/test.lock
 	@touch $@
 
 $(READY_TO_CHECK): $(READY_TO_TEST) tests/check.lock
-	$(INSTALL) -r tests/check.lock
+	$(INSTALL) tests/check.lock
 	@touch $@
 
 $(READY_TO_COMPARE): $(READY_TO_TEST) tests/oracles.lock
-	$(INSTALL) -r tests/oracles.lock
+	$(INSTALL) tests/oracles.lock
 	@touch $@

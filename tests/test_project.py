@@ -15,6 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 MAKEFILE = (ROOT / "Makefile").read_text()
 LOCKS = {  # lock -> what it pins, with all that this needs in turn
     "requirements.lock": [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]],
+    ".ci/install.lock": PROJECT["dependency-groups"]["install"],
     **{f"tests/{group}.lock": PROJECT["dependency-groups"][group] for group in ("test", "check", "oracles")},
 }
 TARGETS = dict(re.findall(r"^([a-z]+):([^#\n]*)##", MAKEFILE, re.M))
@@ -37,11 +38,9 @@ def names(requirements: list[str]) -> set[str]:
 
 
 def test_every_group_of_requirements_has_a_lock_and_every_lock_a_group():
-    assert {"build", *(lock.removesuffix(".lock") for lock in ("test", "check", "oracles"))} == set(
-        PROJECT["dependency-groups"]
-    )
-    found = {file.relative_to(ROOT).as_posix() for file in (ROOT / "tests").rglob("*.lock")} | {"requirements.lock"}
-    assert found == set(LOCKS)
+    assert {"build", "install", "test", "check", "oracles"} == set(PROJECT["dependency-groups"])
+    found = {file.relative_to(ROOT).as_posix() for folder in ("tests", ".ci") for file in (ROOT / folder).rglob("*.lock")}
+    assert found | {"requirements.lock"} == set(LOCKS)
 
 
 @pytest.mark.parametrize("lock", LOCKS)

@@ -135,8 +135,8 @@ def joint_section(
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
     figure = Figure(
         f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. The line is "
-        f"the weighted mean; grey are its control limits: {100 * INSIDE_LIMITS:.1f} % of further values in control are inside. "
-        "Studies that stand out are named.",
+        f"the weighted mean. Grey: its control limits, which {100 * INSIDE_LIMITS:.1f} % of further values in control "
+        "keep. Studies that stand out are named.",
         f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}.",
         tuple(panel(series, findings) for series in drawn),
         f"campaign-{label}",
