@@ -15,8 +15,8 @@ READY := .venv/ready
 READY_TO_TEST := .venv/ready-to-test
 READY_TO_CHECK := .venv/ready-to-check
 READY_TO_COMPARE := .venv/ready-to-compare
-PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 INSTALL := $(BIN)/python .ci/install.py
+PINNED := $(INSTALL) --require-hashes -r
 # A file's tests share what they analyse and compile, so a file stays in one process.  Processes share the bytecode of
 # the package, without which each of them takes seconds more to begin.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
@@ -105,19 +105,19 @@ $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { echo "Python cannot make environments here; on Debian and Ubuntu run: apt-get install python3-venv"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(INSTALL) requirements.lock
+	$(PINNED) requirements.lock
 	@$(BIN)/python -c "$$FORGET"
-	$(PIP) install --no-deps --no-build-isolation -e .
+	$(INSTALL) --no-build-isolation -e .
 	@touch $@
 
 $(READY_TO_TEST): $(READY) tests/test.lock
-	$(INSTALL) tests/test.lock
+	$(PINNED) tests/test.lock
 	@touch $@
 
 $(READY_TO_CHECK): $(READY_TO_TEST) tests/check.lock
-	$(INSTALL) tests/check.lock
+	$(PINNED) tests/check.lock
 	@touch $@
 
 $(READY_TO_COMPARE): $(READY_TO_TEST) tests/oracles.lock
-	$(INSTALL) tests/oracles.lock
+	$(PINNED) tests/oracles.lock
 	@touch $@

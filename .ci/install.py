@@ -1,8 +1,8 @@
-"""Install pinned packages into the environment of this interpreter: by uv, or by pip where uv fails for any reason.
+"""Install packages into the environment of this interpreter: by uv, or by pip where uv fails for any reason.
 
-    python .ci/install.py LOCK
+    python .ci/install.py --require-hashes -r LOCK
 
-Both check the hashes of the lock.  uv is the machine's, or pip brings the pinned one into the environment.  It needs a
+The arguments are those of `pip install`.  uv is the machine's, or pip brings the pinned one into the environment.  It needs a
 third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates, trusted hosts.
 """
 
@@ -26,14 +26,14 @@ SETTINGS = {  # pip's setting -> uv's variable
 }
 
 
-def main(lock: str) -> int:
-    """Install what a lock pins; the exit code."""
+def main(*arguments: str) -> int:
+    """Install packages, without what they need in turn; the exit code."""
     try:
-        command = [uv(), "pip", "install", "-q", "--python", sys.executable, "--require-hashes", "--no-deps", "-r", lock]
+        command = [uv(), "pip", "install", "-q", "--python", sys.executable, "--no-deps", *arguments]
         subprocess.run(command, check=True, env=os.environ | settings())
     except (OSError, subprocess.CalledProcessError) as error:
-        print(f"uv could not install {lock} ({error}); pip installs it", file=sys.stderr)
-        return subprocess.run([*PIP, "install", "--require-hashes", "--no-deps", "-r", lock]).returncode
+        print(f"uv could not install ({error}), so pip does: {' '.join(arguments)}", file=sys.stderr)
+        return subprocess.run([*PIP, "install", "--no-deps", *arguments]).returncode
     return 0
 
 
