@@ -2,8 +2,8 @@
 
     python .ci/install.py --require-hashes -r LOCK
 
-The arguments are those of `pip install`.  uv is the machine's, or pip brings the pinned one into the environment.  It needs a
-third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates, trusted hosts.
+The arguments are those of `pip install`.  uv is the machine's, or pip brings the pinned one into the environment.  It
+needs a third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates, trusted hosts.
 """
 
 import os
@@ -51,8 +51,8 @@ def settings() -> dict[str, str]:
     """uv's environment, by pip's settings; the most specific of several files, and pip's variables, come last."""
     listed = subprocess.run([*PIP, "config", "list"], capture_output=True, text=True, check=True).stdout
     stated = dict(line.split("=", 1) for line in listed.splitlines() if "=" in line)
-    by_name = {name.rpartition(".")[2]: value.strip("'\"") for name, value in stated.items()}
-    found = {SETTINGS[name]: " ".join(value.replace("\\n", " ").split()) for name, value in by_name.items() if name in SETTINGS}
+    by_name = {name.rpartition(".")[2]: value.strip("'\"").replace("\\n", " ") for name, value in stated.items()}
+    found = {SETTINGS[name]: " ".join(value.split()) for name, value in by_name.items() if name in SETTINGS}
     if "UV_FIND_LINKS" in found:
         found["UV_FIND_LINKS"] = found["UV_FIND_LINKS"].replace(" ", ",")
     found["UV_INDEX_STRATEGY"] = "unsafe-best-match"  # all indexes alike, as for pip; the hashes keep that safe

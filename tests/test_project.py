@@ -39,7 +39,9 @@ def names(requirements: list[str]) -> set[str]:
 
 def test_every_group_of_requirements_has_a_lock_and_every_lock_a_group():
     assert {"build", "install", "test", "check", "oracles"} == set(PROJECT["dependency-groups"])
-    found = {file.relative_to(ROOT).as_posix() for folder in ("tests", ".ci") for file in (ROOT / folder).rglob("*.lock")}
+    found = {
+        file.relative_to(ROOT).as_posix() for folder in ("tests", ".ci") for file in (ROOT / folder).rglob("*.lock")
+    }
     assert found | {"requirements.lock"} == set(LOCKS)
 
 

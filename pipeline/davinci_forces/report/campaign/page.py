@@ -4,8 +4,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.drift import MIN_VALUES_TREND, control_limits
 from davinci_forces.report.campaign.studies import (
     FLOORS,
     CampaignStudy,
@@ -37,8 +35,6 @@ from davinci_forces.report.context import count, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.verdicts import band, verdict_words
 from davinci_forces.report.writers import render_all
-
-INSIDE_LIMITS = 0.9973  # of values in control: three standard deviations of a normal distribution
 
 
 def render_campaign(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings: Findings) -> dict[str, bytes]:
@@ -135,7 +131,7 @@ def joint_section(
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
     figure = Figure(
         f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. The line is "
-        f"the weighted mean. Grey: its control limits, which {100 * INSIDE_LIMITS:.1f} % of further values in control "
+        f"the weighted mean. Grey: control limits, which {100 * findings.inside:.1f} % of further values in control "
         "keep. Studies that stand out are named.",
         f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}.",
         tuple(panel(series, findings) for series in drawn),
@@ -198,7 +194,10 @@ def panel(series: Series, findings: Findings) -> Panel:
     t, out = findings.times(series), list(findings.stand_out(series))
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(series.std)
-    marks: list[AnyMark] = [*limits(series, t, inside)]
+    marks: list[AnyMark] = []
+    if limits := findings.limits.get(series_key(series)):
+        marks.append(Band(t[inside], limits.centre - limits.width, limits.centre + limits.width, "", "grey"))
+        marks.append(HLine(limits.centre, "", "grey", "solid"))
     if inside:
         marks.append(Points(t[inside], series.value[inside], "", "blue", std[inside]))
     if out:
@@ -209,12 +208,3 @@ def panel(series: Series, findings: Findings) -> Panel:
     x_range = None if findings.by_date else (min(findings.time.values()) - 0.5, max(findings.time.values()) + 0.5)
     heading = f"{name} [{unit}]" if unit else name
     return Panel(name, label, heading, tuple(marks), x_range, x_dates=findings.by_date)
-
-
-def limits(series: Series, t: Array, inside: list[int]) -> Iterator[AnyMark]:
-    """The weighted mean of the studies that do not stand out, and their control limits."""
-    if len(inside) < MIN_VALUES_TREND or not np.isfinite(series.std).all():
-        return
-    centre, width = control_limits(series.value[inside], series.std[inside], INSIDE_LIMITS)
-    yield Band(t[inside], centre - width, centre + width, "", "grey")
-    yield HLine(centre, "", "grey", "solid")

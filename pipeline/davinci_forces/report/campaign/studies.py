@@ -112,6 +112,13 @@ class Slope(NamedTuple):
     std: float
 
 
+class Limits(NamedTuple):
+    """The weighted mean of the studies that do not stand out, and the distance of the control limits at each."""
+
+    centre: float
+    width: Array
+
+
 @dataclass(frozen=True)
 class Findings:
     """The series that drift, vary beyond their errors or stand out, corrected for the number of tests."""
@@ -122,6 +129,8 @@ class Findings:
     slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of the series that drift
     varying: frozenset[Place] = frozenset()
     outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
+    limits: Mapping[Place, Limits] = field(default_factory=dict)  # of the series of three such studies or more
+    inside: float = 0.0  # share of further values in control that keep the limits
     tests: int = 0
     chance: float = 0.0  # that any test gives a false alarm
 

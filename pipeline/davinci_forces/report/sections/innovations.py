@@ -30,7 +30,7 @@ FINDINGS = {  # from the best to the least known
     "mended": "white if tested causes are corrected",
     UNEXPLAINED: "not white, whatever tested cause is corrected",
 }
-PRINTED = 9  # largest number of runs in the table of the PDF
+PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
@@ -105,12 +105,12 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
     return Table(
         "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
         f"innovation over its stated variance, which is 1 if that variance is right.{within} The PDF has the "
-        f"{PRINTED} runs with the smallest p-values.",
+        f"{PRINTED_RUNS} runs with the smallest p-values.",
         ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict"),
         rows,
         "innovation-verdicts",
         "llrrl",
-        tuple(sorted(sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])[:PRINTED])),
+        tuple(sorted(sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])[:PRINTED_RUNS])),
     )
 
 

@@ -12,7 +12,14 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.files import read_bytes, write_bytes
-from davinci_forces.maths.estimation.drift import holm, outlier_probabilities, scatter, trend
+from davinci_forces.maths.estimation.drift import (
+    MIN_VALUES_TREND,
+    control_limits,
+    holm,
+    outlier_probabilities,
+    scatter,
+    trend,
+)
 from davinci_forces.report.campaign.page import render_campaign
 from davinci_forces.report.campaign.studies import (
     DAY,
@@ -20,6 +27,7 @@ from davinci_forces.report.campaign.studies import (
     CampaignStudy,
     Findings,
     JointVerdict,
+    Limits,
     Place,
     Series,
     Slope,
@@ -31,6 +39,7 @@ from davinci_forces.runner import runs
 from davinci_forces.runner.results import stated
 
 FALSE_ALARM_PROBABILITY = 0.05  # for all tests of a page together
+IN_CONTROL = 0.9973  # share of values in control that keep the limits: three standard deviations, if normal
 
 
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
@@ -129,10 +138,19 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     significant = [test for test, rejected in zip(tests, rejections, strict=True) if rejected]
     drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
     odd = {where: tuple(i for k, at, i in significant if k == "outlier" and at == where) for _, where, _ in significant}
+    limits = {series_key(row): limit for row in series if (limit := limits_of(row, odd.get(series_key(row), ())))}
     return Findings(
-        tuple(series), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd,
-        len(tests), FALSE_ALARM_PROBABILITY,
+        tuple(series), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd, limits,
+        IN_CONTROL, len(tests), FALSE_ALARM_PROBABILITY,
     )  # fmt: skip
+
+
+def limits_of(row: Series, odd: tuple[int, ...]) -> Limits | None:
+    """The control limits of a series, without the studies that stand out; None if too few have standard errors."""
+    value, std = (np.delete(column, odd) for column in (row.value, row.std))
+    if len(value) < MIN_VALUES_TREND or not np.isfinite([value, std]).all():
+        return None
+    return Limits(*control_limits(value, std, IN_CONTROL))
 
 
 def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:
