@@ -3,7 +3,7 @@
     python .ci/install.py --require-hashes -r LOCK
 
 The arguments are those of `pip install`.  uv is the machine's, or pip brings the pinned one into the environment.  It
-needs a third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates, trusted hosts.
+needs a third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates.
 """
 
 import os

@@ -66,7 +66,7 @@ TIERS = (
     ("logs", "records", "robots"),
     ("maths", "toml"),
     ("files",),
-    ("errors", "version"),
+    ("errors",),
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
 MATHS = (
@@ -92,7 +92,8 @@ def imports(source: Path) -> set[str]:
     names = set()
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
-            names |= {f"{node.module}.{a.name}" for a in node.names}
+            # The version stands in the package itself, which is there before any of its modules.
+            names |= {f"{node.module}.{a.name}" for a in node.names if a.name != "__version__"}
         elif isinstance(node, ast.Import):
             names |= {a.name for a in node.names}
     return names

@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from davinci_forces.version import VERSION
-
 if TYPE_CHECKING:
     import pandas as pd
 
     from davinci_forces.robots.robot import Robot
 
 __all__ = ["read", "results", "robot", "run"]
-__version__ = VERSION
+__version__ = "0.2.0.dev0"  # pyproject.toml and the citation state it, too
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":

@@ -193,9 +193,9 @@ def print_errors(run: Callable[..., Any]) -> Callable[..., Any]:
 def print_version(is_requested: bool) -> None:
     """Print the version and exit, if the option is set."""
     if is_requested:
-        from davinci_forces.version import VERSION
+        from davinci_forces import __version__
 
-        echo(f"davinci-forces {VERSION}")
+        echo(f"davinci-forces {__version__}")
         raise typer.Exit
 
 

@@ -129,7 +129,7 @@ def test_a_chart_has_dates_and_limits_that_values_in_control_keep(tmp_path):
     text = unquote(page(tmp_path))
     assert re.search(r"01-\d\d", text)
     assert "2024" in text
-    assert "control limits: 99.7 %" in text
+    assert "control limits, which 99.7 %" in text
 
 
 def test_control_limits_hold_as_many_values_as_they_say():

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from davinci_forces import __version__
 from davinci_forces.exports import FORMATS
 from davinci_forces.runner.console import echo
-from davinci_forces.version import VERSION
 
 
 def run(
@@ -71,7 +71,7 @@ def _permitted(folders: Any, joints: list[str], despite_verdict: bool) -> Any:
     study, ledger = reading.read(folders.raw), Ledger(folders)
     catalogue = reporting.catalogue(ledger, Plan(study, ledger).places().find(tuple(KINDS.values())))
     verdicts = {j["joint"]: j["verdict"] for j in campaign.read_summary(folders.reports / "summary.json")["joints"]}
-    origin = ExportOrigin(VERSION, identity(read_bytes(folders.reports / MANIFEST)), verdicts)
+    origin = ExportOrigin(__version__, identity(read_bytes(folders.reports / MANIFEST)), verdicts)
     export = export_of(study, catalogue, origin, joints)
     reasons = [f"joint {j.name} has the verdict Problem" for j in export.joints if verdicts.get(j.name) == "bad"]
     used = {STUDY: {""}, "run": {log for fit, _ in export.fits.values() for log in fit.logs}}

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from typing import Any
 
+from davinci_forces import __version__
 from davinci_forces.files import read_bytes, write_bytes
 from davinci_forces.records import KINDS
 from davinci_forces.robots.robot import Kind
@@ -16,7 +17,6 @@ from davinci_forces.runner.places import ANY, Located, Places, is_about_log, log
 from davinci_forces.runner.signature import Declaration, stage_of
 from davinci_forces.stages import module
 from davinci_forces.study import Study
-from davinci_forces.version import VERSION
 
 # The code that makes, checks and stores every record; other modules of the folder declare records, see `schemas`.
 RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("record", "store"))
@@ -106,7 +106,7 @@ class Plan:
             if what != "log"
         }
         digests = {name: self.ledger.digest(name) for name in sorted(inputs)}
-        fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), code_of(asks), VERSION)
+        fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), code_of(asks), __version__)
         return Task(asks.name, name, fingerprint, records, values, settings, self._joints)
 
     def _given(self, what: str, log: str, joint: str) -> Any:

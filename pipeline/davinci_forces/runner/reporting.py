@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
+from davinci_forces import __version__
 from davinci_forces.files import digest, read_bytes, text_of, write_together
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
@@ -22,7 +23,6 @@ from davinci_forces.runner.processes import arithmetic
 from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
 from davinci_forces.study.review import Rating
-from davinci_forces.version import VERSION
 
 MAX_CACHED_ROWS = 1 << 16  # rows of a record that stays in memory while the report is made
 PACKAGES = "numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "clarabel", "matplotlib", "typst", "npTDMS"
@@ -40,7 +40,7 @@ def task(plan: Plan) -> Task:
         schemas={},
         code=code("davinci_forces.report.report", "davinci_forces.records.store")
         | {"the whole package": package_fingerprint()},
-        version=VERSION,
+        version=__version__,
     )
     return Task(REPORT, REPORT, fingerprint, {"records": located}, {"study": study})
 
@@ -111,7 +111,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
     failures = {" ".join([*entry.stage.split("."), entry.task]): entry.failed for entry in failed}
     text = text_of(read_bytes(study.folder / "study.toml"), errors="replace")
-    return Provenance(study.name, VERSION, versions(), raw, processed, failures, text, package_fingerprint())
+    return Provenance(study.name, __version__, versions(), raw, processed, failures, text, package_fingerprint())
 
 
 def versions() -> dict[str, str]:

@@ -112,7 +112,7 @@ class Slope(NamedTuple):
     std: float
 
 
-class Limits(NamedTuple):
+class ControlLimits(NamedTuple):
     """The weighted mean of the studies that do not stand out, and the distance of the control limits at each."""
 
     centre: float
@@ -129,7 +129,7 @@ class Findings:
     slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of the series that drift
     varying: frozenset[Place] = frozenset()
     outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
-    limits: Mapping[Place, Limits] = field(default_factory=dict)  # of the series of three such studies or more
+    limits: Mapping[Place, ControlLimits] = field(default_factory=dict)  # of the series of three such studies or more
     inside: float = 0.0  # share of further values in control that keep the limits
     tests: int = 0
     chance: float = 0.0  # that any test gives a false alarm

@@ -25,9 +25,9 @@ from davinci_forces.report.campaign.studies import (
     DAY,
     FLOORS,
     CampaignStudy,
+    ControlLimits,
     Findings,
     JointVerdict,
-    Limits,
     Place,
     Series,
     Slope,
@@ -145,12 +145,12 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     )  # fmt: skip
 
 
-def limits_of(row: Series, odd: tuple[int, ...]) -> Limits | None:
+def limits_of(row: Series, odd: tuple[int, ...]) -> ControlLimits | None:
     """The control limits of a series, without the studies that stand out; None if too few have standard errors."""
     value, std = (np.delete(column, odd) for column in (row.value, row.std))
     if len(value) < MIN_VALUES_TREND or not np.isfinite([value, std]).all():
         return None
-    return Limits(*control_limits(value, std, IN_CONTROL))
+    return ControlLimits(*control_limits(value, std, IN_CONTROL))
 
 
 def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:
