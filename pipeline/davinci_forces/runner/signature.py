@@ -1,5 +1,6 @@
 """Read from the signatures of a stage's functions which records its steps read and make."""
 
+import ast
 import re
 import types
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -7,12 +8,11 @@ from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
-from inspect import Parameter, signature
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin
 
 from davinci_forces.logs.log import Log
-from davinci_forces.records import Record
+from davinci_forces.records import KINDS, Record
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.stages import module
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Weighings
@@ -24,6 +24,8 @@ ARGUMENT_KINDS = {
     Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
 }  # fmt: skip
 SETTINGS = tuple(f.name for f in fields(Settings))
+GENERIC = {kind.__name__: kind for kind in (Collection, Iterable, Iterator, Sequence)}
+TYPES = KINDS | GENERIC | {kind.__name__: kind for kind in ARGUMENT_KINDS} | {"Annotated": Annotated}
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,7 @@ def steps(stage: str) -> tuple[str, ...]:
 
     They are read from the text of its module, since importing all stages takes longer than reading a log.
     """
-    spec = find_spec(module(stage))
-    exported = set(FUNCTION.findall(Path(str(spec and spec.origin)).read_text(encoding="utf-8")))
+    exported = set(FUNCTION.findall(_source(stage)))
     return tuple(stage if name == "run" else f"{stage}.{name}" for name in FUNCTIONS if name in exported)
 
 
@@ -74,10 +75,8 @@ def function_of(step: str) -> Callable[..., Iterator[Record]]:
 @cache
 def declaration(step: str) -> Declaration:
     """Read the signature of a step."""
-    function = function_of(step)
-    hints = get_type_hints(function, include_extras=True)
-    makes = _kinds(_inner(hints.pop("return")))
-    declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, _settings(step, function), makes)
+    settings, hints = _signature(step)
+    declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, settings, _kinds(_inner(hints.pop("return"))))
     for parameter, hint in hints.items():
         if parameter in declared.settings:
             continue
@@ -99,11 +98,24 @@ def declaration(step: str) -> Declaration:
     return declared
 
 
-def _settings(step: str, function: Any) -> tuple[str, ...]:
-    names = [p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
-    if unknown := sorted(set(names) - set(SETTINGS)):
+def _signature(step: str) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """The settings that a step takes, and the types of its parameters and of what it returns.
+
+    They are read from the text of its module, too.
+    """
+    stage, _, name = step.partition(".")
+    body = ast.parse(_source(stage)).body
+    function = next(node for node in body if isinstance(node, ast.FunctionDef) and node.name == (name or "run"))
+    settings = tuple(argument.arg for argument in function.args.kwonlyargs)
+    if unknown := sorted(set(settings) - set(SETTINGS)):
         raise TypeError(f"{step} takes settings that do not exist: {', '.join(unknown)}")
-    return tuple(names)
+    hints = {a.arg: a.annotation for a in function.args.args} | {"return": function.returns}
+    return settings, {name: eval(ast.unparse(hint), TYPES) for name, hint in hints.items() if hint}
+
+
+def _source(stage: str) -> str:
+    spec = find_spec(module(stage))
+    return Path(str(spec and spec.origin)).read_text(encoding="utf-8")
 
 
 def _inner(hint: Any) -> Any:
