@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.errors import PipelineError
-from davinci_forces.filters import ekf, rts, stepping, tracker
+from davinci_forces.filters import ekf, rts, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import lag, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
@@ -108,13 +108,23 @@ def test_the_steady_state_is_the_riccati_solution():
 def test_one_sample_at_a_time_is_the_whole_recording_at_once():
     recording, _ = matched("hand_roll", N=500)
     made = ekf.track(recording, NOISE)
-    s = stepping.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.initial_std)
+    s = sample.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.initial_std)
     joint = recording.joint
     for k, y in enumerate(zip(recording.q, recording.dq, strict=True)):
         drive = recording.tau[k] - joint.known[k]
-        now, s = ekf.step(s, y, drive, joint.inertia[k], joint.coefficients, T_S, NOISE)
+        before = s
+        now, s = ekf.step(before, y, drive, joint.inertia[k], joint.coefficients, T_S, NOISE)
+        assert (now, s) == plain_step(before, y, drive, joint.inertia[k], joint.coefficients)
         assert now[2] == made.tau_ext[k]
         assert now[8] ** 0.5 == made.tau_ext_std[k]
+
+
+def plain_step(s, y, drive, M, c_b):
+    """The same in plain Python, as exports have it."""
+    R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, T_S)
+    now, *_ = sample.correct(s, *y, R_q, R_dq)
+    q, dq, F, friction_var = sample.transition(*now[:3], now[6], drive, M, c_b, T_S, 0.5 * T_S * T_S)
+    return now, sample.predict(now, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
 def thesis_triangle(seed=0):

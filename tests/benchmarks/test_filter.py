@@ -14,7 +14,8 @@ from numpy.testing import assert_allclose
 from davinci_forces.filters import rts
 from davinci_forces.filters.ekf import track
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, covariances
+from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
+from davinci_forces.filters.stepping import covariances
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.records import Track
 from davinci_forces.records.store import Writer

@@ -15,7 +15,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from davinci_forces.filters import FILTERS, kalman, title, tracker
 from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel
-from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO
+from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.filters import FILTERS, tracker
+from davinci_forces.filters import FILTERS, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.identification.observations import observe
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
 from davinci_forces.maths.models import bias as derivation
-from davinci_forces.maths.models import kernels, terms
+from davinci_forces.maths.models import terms
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
@@ -180,7 +180,7 @@ def test_the_effort_of_an_independent_joint_is_what_its_filter_is_told():
     theta, motion = np.array([0.5, 0.1, -0.2, 0.7, 0.3, 0.05, 0.4]), column(wandering(3000))
     [told] = model.joint_dynamics(theta, motion)
     scalar = [
-        kernels.bias(told.coefficients, q, dq, 0.0)[0] for q, dq in zip(motion.q[:, 0], motion.dq[:, 0], strict=True)
+        sample.bias(told.coefficients, q, dq, 0.0)[0] for q, dq in zip(motion.q[:, 0], motion.dq[:, 0], strict=True)
     ]
     tau = told.inertia * motion.ddq[:, 0] + np.array(scalar) + told.known
     assert_allclose(tau, (model.regressor(motion).Phi @ theta)[:, 0], rtol=1e-12, atol=1e-13)

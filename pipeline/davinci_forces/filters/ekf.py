@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
-from davinci_forces.filters.stepping import Belief, arguments, correct, covariances, predict, transition
+from davinci_forces.filters.sample import Belief
+from davinci_forces.filters.stepping import arguments, correct, covariances, predict, transition
 from davinci_forces.maths.compiled import compile_and_store
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.signals.windows import TRANSIENT
@@ -42,7 +43,7 @@ def step(
 ) -> tuple[Belief, Belief]:
     """Filter one sample as it arrives: return the corrected state, and its prediction for the next sample.
 
-    `s` is the last prediction, or `stepping.first`; `y` are position and velocity; `drive` is the effort less the known
+    `s` is the last prediction, or `sample.first`; `y` are position and velocity; `drive` is the effort less the known
     effort of other joints.  The results equal those of `track` exactly for the same drive and inertia M.
     """
     corrected, predicted = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))

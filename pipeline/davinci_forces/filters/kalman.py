@@ -13,7 +13,8 @@ import numpy as np
 
 from davinci_forces.filters.ekf import LOG_2_PI
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, columns, covariances, transition
+from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
+from davinci_forces.filters.stepping import columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import ekf, stepping
+from davinci_forces.filters import ekf, sample
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
@@ -165,12 +165,12 @@ def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]
     """The extended Kalman filter: a function from successive sensor readings to forces.  (7.6), (7.7)"""
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     noise, c_b = filter_noise(scenario), coefficients(body)
-    predicted: stepping.Belief | None = None
+    predicted: sample.Belief | None = None
 
     def estimate(reading: SensorReading) -> float:
         nonlocal predicted
         if predicted is None:
-            predicted = stepping.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)
+            predicted = sample.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)
         now, predicted = ekf.step(predicted, (reading.q, reading.dq), reading.tau, body.inertia, c_b, T_s, noise)
         return now[2]
 

@@ -1,4 +1,4 @@
-"""The bias of one joint: functions for arrays of samples, which are also compiled for single samples.
+"""The bias of one joint: functions for arrays of samples; `filters.sample` has those of one sample.
 
     b(q, dq) = c_1 + c_s sin q + c_c cos q + c_q q + c_v dq + c_f sign(dq) + c_z z                     (7.15), (7.16)
 

@@ -1,4 +1,4 @@
-"""Compiled parts of a model: the bias and the deflection of one sample, and the deflection along a motion.
+"""Compiled parts of a model: the deflection of one sample, and along a motion.
 
 Import this module inside the function that uses it: to compile it or to load it from the cache on disk takes time.
 """
@@ -8,7 +8,6 @@ from typing import Any
 from davinci_forces.maths.compiled import compile_and_store, inline
 from davinci_forces.maths.models import bias as derivation
 
-bias = inline(derivation.bias)
 deflect = inline(derivation.deflect)
 
 
