@@ -221,7 +221,7 @@ def identified():
     made = list(fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0))
     fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
     [model], [noise] = arm.models([signal], fits), noises
-    return fits, list(tune.gather(list(tune.run(model, noise, lowpass=17.0))))
+    return fits, list(tune.gather(list(tune.run(model, noise, lowpass=17.0, delay=0.1)), delay=0.1))
 
 
 def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
@@ -272,6 +272,11 @@ def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_
     assert_allclose(walks, [0.7, 0.3])
     found = noise_model(noise, joint, T_S, 0.0)
     assert found.q_tau == smallest_q_tau(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
+    quick = noise_model(replace(noise, delay=0.02), joint, T_S, 0.0)
+    shown = push_response_at_rest(ekf.track, noise.inertia, noise.viscous, T_S, quick)
+    assert shown.delay <= 0.02 + 1e-9
+    assert quick.q_tau > found.q_tau
+    assert noise_model(replace(noise, delay=0.02), own, T_S, 0.0).q_tau == pytest.approx(0.3 * np.sqrt(T_S))
 
 
 def test_a_gap_starts_the_filter_anew(identified):

@@ -68,7 +68,7 @@ def identified():
     records = list(fit.run([own], [arm.motion(signal)], arm.ARM, lowpass=LOWPASS))
     fits, [between] = ([r for r in records if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
     [model] = arm.models([signal], fits)
-    [noise] = tune.gather(tune.run(model, between, lowpass=LOWPASS))
+    [noise] = tune.gather(tune.run(model, between, lowpass=LOWPASS, delay=0.1), delay=0.1)
     free = [calibrated(resting(stuck, role="validation"), fits, noise) for stuck in (0.9, -0.9)]
     return fits, noise, free
 

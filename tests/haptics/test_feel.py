@@ -35,8 +35,10 @@ def fit(theta=THETA, estimator="lse") -> Fit:
 
 
 def noise(joint="instrument_slide") -> FilterNoise:
-    numbers = dict.fromkeys(FilterNoise.scalars(), 1.0)
-    return FilterNoise(**(numbers | {"joint": joint, "logs": ("a",), "r_q": 1e-6, "r_dq": 2e-3, "r_tau": 0.7}))
+    numbers = dict.fromkeys(FilterNoise.scalars(), 1.0) | dict.fromkeys(FilterNoise.columns(), np.zeros(0))
+    return FilterNoise(
+        **(numbers | {"joint": joint, "logs": ("a",), "delay": 0.1, "r_q": 1e-6, "r_dq": 2e-3, "r_tau": 0.7})
+    )
 
 
 def made(tissues, fits=(), noises=(), scenario=SCENARIO) -> list:

@@ -16,7 +16,8 @@ K = 457.24
 SCENARIO = HapticScenario(hands=(("one", Hand(1.0, 10.0, 300.0)),), plan=((0.0, -0.01), (1.0, 0.01), (2.0, -0.01)))
 NOISE = FilterNoise(
     **dict.fromkeys(FilterNoise.scalars(), 1.0)
-    | {"joint": "instrument_slide", "logs": ("a",), "inertia": SLIDE.inertia, "viscous": SLIDE.viscous}
+    | dict.fromkeys(FilterNoise.columns(), np.zeros(0))
+    | {"joint": "instrument_slide", "logs": ("a",), "delay": 0.1, "inertia": SLIDE.inertia, "viscous": SLIDE.viscous}
     | {f"r_{name}": value for name, value in SLIDE_NOISE._asdict().items()}
 )
 MEASURED = (

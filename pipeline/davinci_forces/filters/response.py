@@ -1,6 +1,7 @@
 """The response of a filter to a push, and the smallest random walk q_tau with which the filter follows a push.
 
-The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, at most 0.1 s late.
+The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, at most the `delay` of
+the settings late.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
 
 DURATION = 1.0  # [s] duration of the push
-MIN_SHARE, MAX_DELAY = 0.9, 0.1  # estimated peak / peak of the push; [s]
+MIN_SHARE, MAX_PUSH_DELAY = 0.9, 0.1  # estimated peak / peak of the push; [s], unless the settings state another
 BEFORE, AFTER = 2.0, 1.0  # [s] before and after the push, in the trial on a joint at rest
 WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, in units of inertia * velocity noise / T_s
 BISECTIONS = 60  # halvings of the logarithmic search range
@@ -62,8 +63,10 @@ def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
 
 
 @lru_cache(CACHED_WALKS)
-def smallest_q_tau(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
-    """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push.
+def smallest_q_tau(
+    track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel, delay: float = MAX_PUSH_DELAY
+) -> float:
+    """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push within `delay` [s].
 
     A filter without a random walk does not use `q_tau`, so the lowest value of the search range is returned.
     """
@@ -71,9 +74,16 @@ def smallest_q_tau(track: Filter, inertia: float, viscous: float, T_s: float, no
     low, high = (ratio * noise_effort for ratio in WALK_RANGE)
     for _ in range(BISECTIONS):
         middle = float(np.sqrt(low * high))
-        share, delay = push_response_at_rest(track, inertia, viscous, T_s, noise._replace(q_tau=middle))
-        low, high = (low, middle) if share >= MIN_SHARE and delay <= MAX_DELAY else (middle, high)
+        share, late = push_response_at_rest(track, inertia, viscous, T_s, noise._replace(q_tau=middle))
+        low, high = (low, middle) if share >= MIN_SHARE and late <= delay else (middle, high)
     return high
+
+
+def steady_std(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
+    """Compute the standard deviation of the external effort on a joint at rest, once the filter has converged."""
+    still = np.zeros(round(BEFORE / T_s) + 1)
+    at_rest = stationary_joint(np.full(len(still), inertia), viscous, still, T_s, initial_std=1.0)
+    return float(ekf.track(at_rest, noise).tau_ext_std[-1])
 
 
 def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name: str = DEFAULT) -> NoiseModel:
@@ -81,12 +91,12 @@ def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name:
 
     The effort's noise drives the model, as an acceleration that is constant over a sample.  `walk` is the random walk
     of the external effort [effort/s^0.5] from the settings.  If `walk` is 0, the walk of the joint is used.  If that is
-    0, too, the smallest walk with which this filter follows a push is used.
+    0, too, the smallest walk with which this filter follows a push within the joint's `delay` is used.
     """
     walk = walk or joint.q_tau
     noise = NoiseModel(tuned.r_q, tuned.r_dq, 0.0, tuned.r_tau * T_s / tuned.inertia, walk * T_s**0.5)
     return noise if walk else noise._replace(
-        q_tau=smallest_q_tau(tracker(name), tuned.inertia, tuned.viscous, T_s, noise)
+        q_tau=smallest_q_tau(tracker(name), tuned.inertia, tuned.viscous, T_s, noise, tuned.delay)
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import smallest_q_tau
+from davinci_forces.filters.response import MAX_PUSH_DELAY, smallest_q_tau
 from davinci_forces.maths.arrays import Array
 
 ROUNDS = 4  # number of rounds that fit the likelihood and the push in turn
@@ -19,10 +19,13 @@ MAX_LOG_CHANGE = np.log(1e3)  # largest change of a standard deviation's logarit
 MAX_SAMPLES_TUNING = 20_000  # at most this number of each recording's samples is used
 
 
-def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float) -> NoiseModel:
+def tune_noise(
+    recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float, delay: float = MAX_PUSH_DELAY
+) -> NoiseModel:
     """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
 
     `inertia` is the largest along the recordings: with the largest inertia the filter is slowest.
+    The filter shows a push within `delay` [s].
     """
     from scipy.optimize import minimize
 
@@ -31,7 +34,7 @@ def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: fl
     noise, center = start, np.log([start.r_q, start.r_dq, start.q_dq])
     change = np.zeros(len(center))
     for _ in range(ROUNDS):
-        noise = noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise))
+        noise = noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay))
         walk = noise.q_tau
 
         def cost(change: Array, walk: float = walk) -> float:
@@ -45,7 +48,7 @@ def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: fl
             cost, change, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
         ).x
         noise = noise_of(center + change, walk)
-    return noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise))
+    return noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay))
 
 
 def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:

@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.filters import ekf, sample
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.response import smallest_q_tau
+from davinci_forces.filters.response import MAX_PUSH_DELAY, smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
 from davinci_forces.haptics.maths.delay import Complex, harmonic, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
@@ -58,6 +58,7 @@ def complete_scenario(
     noise: AxisNoise = SLIDE_NOISE,
     stiffness: float = THESIS_TISSUE,
     q_tau: float = 0.0,
+    delay: float = MAX_PUSH_DELAY,
 ) -> HapticScenario:
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body
@@ -68,6 +69,7 @@ def complete_scenario(
         noise=scenario.noise or noise,
         stiffness=scenario.stiffness or stiffness,
         q_tau=scenario.q_tau or q_tau,
+        filter_delay=delay,
     )
 
 
@@ -187,7 +189,7 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     _, noise = _parts(scenario)
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
-    walk = model.q_tau or smallest_q_tau(ekf.track, body.inertia, body.viscous, T_s, model)
+    walk = model.q_tau or smallest_q_tau(ekf.track, body.inertia, body.viscous, T_s, model, scenario.filter_delay)
     return model._replace(q_tau=walk)
 
 

@@ -25,7 +25,10 @@ class Tuning(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class FilterNoise(JointRecord):
-    """The noise that the filter assumes of a joint: the median of its identification logs."""
+    """The noise that the filter assumes of a joint: the median of its identification logs.
+
+    The columns have what another `delay` would cost: the standard deviation of the filter at rest.
+    """
 
     logs: Names
     rate: float
@@ -33,8 +36,11 @@ class FilterNoise(JointRecord):
     r_dq: float
     r_tau: float
     q_tau: float
+    delay: float
     inertia: float
     viscous: float
+    trial_delay: Column
+    trial_std: Column
 
     def published(self) -> Iterator[Published]:
         """The noise, and the random walk that follows a push at the rate of the identification logs."""

@@ -11,7 +11,7 @@ KINDS = {
     "step": (1e-15, 1e4, "m, rad or A"), "motion": (1e-100, 1e9, "rad or m, and their rates"),
     "mass": (1e-15, 1e9, "kg"), "inertia": (1e-100, 1e12, "kg m^2 or kg"), "stiffness": (1e-9, 1e15, "N/m"),
     "damping": (1e-15, 1e15, "N s/m"), "effort": (1e-9, 1e6, "N m or N"), "force": (1e-15, 1e12, "N or N m"),
-    "q_tau": (1e-15, 1e6, "effort/s^0.5"), "gear_ratio": (1e-6, 1e9, "or rad/m"),
+    "q_tau": (1e-15, 1e6, "effort/s^0.5"), "delay": (1e-3, 10, "s"), "gear_ratio": (1e-6, 1e9, "or rad/m"),
     "torque_constant": (1e-9, 1e6, "N m/A"), "resistance": (1e-9, 1e9, "ohm"), "inductance": (1e-12, 1e6, "H"),
     "current_limit": (1e-9, 1e6, "A"), "voltage_limit": (1e-9, 1e6, "V"), "gain": (1e-12, 1e12, ""),
 }  # fmt: skip

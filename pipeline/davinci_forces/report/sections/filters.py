@@ -6,7 +6,19 @@ import numpy as np
 
 from davinci_forces import filters
 from davinci_forces.records import Comparison, FilterNoise, Track
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
+from davinci_forces.report.content import (
+    Block,
+    Cell,
+    Figure,
+    Line,
+    OnScreen,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    literal,
+)
 from davinci_forces.report.context import Context, label, title
 
 SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
@@ -34,8 +46,9 @@ def blocks(context: Context) -> Iterator[Block]:
         "the innovations (each measurement minus its prediction) in identification logs, where nothing touches the "
         "robot. The external effort is modelled as a random walk. Identification logs cannot show how fast the "
         "external effort may change: a filter tuned to them would miss pushes. So the random walk has the smallest "
-        "intensity with which the filter returns 90 % of the peak of a push (a half-sine of 1 s) at most 0.1 s late "
-        "([@filter-tuning])."
+        "intensity with which the filter returns 90 % of the peak of a push (a half-sine of 1 s) at most "
+        f"{context.study.settings.delay:g} s late ([@filter-tuning]). A longer `delay` in [settings] lowers the "
+        "filter's noise."
     )
     yield tuning(context, noises)
     worst = [track for noise in noises for track in worst_track(context, noise.joint)]
@@ -51,7 +64,7 @@ def blocks(context: Context) -> Iterator[Block]:
         yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
-        compared = comparison(context, comparisons), overlay(comparisons)
+        compared = comparison(context, comparisons), overlay(comparisons), noise_over_delay(noises)
         yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
 
 
@@ -162,6 +175,25 @@ def overlay(compared: list[Comparison]) -> Figure:
         columns=1,
         height=30,
     )  # fmt: skip
+
+
+def noise_over_delay(noises: list[FilterNoise]) -> Figure:
+    """What another delay would cost each joint."""
+    panels = tuple(
+        Panel(
+            title(n.joint), "delay [s]", label(n, "trial_std", "noise"),
+            (Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)), x_log=True,
+        )
+        for n in noises
+    )  # fmt: skip
+    return Figure(
+        f"Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown "
+        f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in [settings] changes it.",
+        f"Noise of the filter over its delay for {len(noises)} joints.",
+        panels,
+        "noise-over-delay",
+        height=35,
+    )
 
 
 def panel(compared: list[Comparison], named: bool) -> Panel:

@@ -58,7 +58,9 @@ def compare(
     shown = response(filter_parts(name, pushed, noise).tau_ext - estimate.tau_ext, model.t, start, push)
     if label == DEFAULT and shown.share < MIN_PUSH_SHARE:
         message = f"{model.log}/{model.joint}: the filter shows only {shown.share:.0%} of a push of {DURATION:g} s"
-        yield diagnostic("benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; raise q_tau in [settings]")
+        yield diagnostic(
+            "benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; state a shorter delay in [settings]"
+        )
     yield Comparison(
         log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
         free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,

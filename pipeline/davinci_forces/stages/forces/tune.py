@@ -6,24 +6,26 @@ import numpy as np
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import NoiseModel, filter_inputs
+from davinci_forces.filters.response import smallest_q_tau, steady_std
 from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
 POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous")  # fields that are pooled by the median
+TRIAL_DELAYS = (0.02, 0.05, 0.1, 0.2, 0.4)  # [s]
 MIN_NOISE = 1e-9  # over the range of a signal: without noise, the innovations' covariance would be singular
 
 
-def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float) -> Iterator[Tuning]:
+def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float, delay: float) -> Iterator[Tuning]:
     """Tune the filter to a moving joint in an identification log, where nothing touches the robot.  Section 7.3"""
     if model.role == "identification" and not model.at_rest and noise is not None:
-        yield tuning(model, initial_noise(model, noise, lowpass))
+        yield tuning(model, initial_noise(model, noise, lowpass), delay)
 
 
-def tuning(model: JointModel, before: NoiseModel) -> Tuning:
+def tuning(model: JointModel, before: NoiseModel, delay: float) -> Tuning:
     """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
     parts, T_s, inertia = filter_inputs(model), 1.0 / model.rate, float(model.inertia.max())
-    noise = tune_noise(parts, before, inertia, model.viscous)
+    noise = tune_noise(parts, before, inertia, model.viscous, delay)
     initial, final = (
         sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
     )
@@ -59,7 +61,7 @@ def initial_noise(model: JointModel, between: MeasurementNoise, lowpass: float) 
     return NoiseModel(sizes[0], sizes[1], 0.0, sizes[2] / model.rate / float(model.inertia.mean()), 0.0)
 
 
-def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
+def gather(tunings: Iterable[Tuning], *, delay: float) -> Iterator[FilterNoise]:
     """Pool the filter noise of each joint: the median over its identification logs.
 
     The inertia is the largest one, because the filter is slowest with it.
@@ -69,4 +71,17 @@ def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
         by_joint.setdefault(tuning.joint, []).append(tuning)
     for joint, ts in by_joint.items():
         medians = {name: float(np.median([getattr(t, name) for t in ts])) for name in POOLED}
-        yield FilterNoise(joint=joint, logs=tuple(t.log for t in ts), inertia=max(t.inertia for t in ts), **medians)
+        inertia, trials = max(t.inertia for t in ts), np.array(TRIAL_DELAYS)
+        std = np.array([std_with_delay(inertia, medians, trial) for trial in TRIAL_DELAYS])
+        logs = tuple(t.log for t in ts)
+        yield FilterNoise(
+            joint=joint, logs=logs, delay=delay, inertia=inertia, trial_delay=trials, trial_std=std, **medians
+        )
+
+
+def std_with_delay(inertia: float, medians: dict[str, float], delay: float) -> float:
+    """Standard deviation of the external effort by a filter that shows a push within `delay` [s]."""
+    T_s, viscous = 1.0 / medians["rate"], medians["viscous"]
+    noise = NoiseModel(medians["r_q"], medians["r_dq"], 0.0, medians["r_tau"] * T_s / inertia, 0.0)
+    walk = smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay)
+    return steady_std(inertia, viscous, T_s, noise._replace(q_tau=walk))

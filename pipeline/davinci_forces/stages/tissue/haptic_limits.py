@@ -53,7 +53,12 @@ def run(
     tuned = next((noise for noise in noises if joint and noise.joint == joint.name), None)
     noise = SLIDE_NOISE if tuned is None else AxisNoise(tuned.r_q, tuned.r_dq, tuned.r_tau)
     scenario = haptic.complete_scenario(
-        haptics, bodies[0], noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0)
+        haptics,
+        bodies[0],
+        noise,
+        float(np.median(tissues)),
+        q_tau or (joint.q_tau if joint else 0.0),
+        tuned.delay if tuned else haptics.filter_delay,
     )
     answer, loop = haptic.response(scenario), limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
