@@ -38,9 +38,10 @@ def render(export: Export) -> dict[str, str]:
 
 def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:
     """What stands for each @NAME@ in model.h and model.c."""
-    chain, joints = document["chain"] or {"up": [0.0] * 3, "links": [NO_LINK]}, document["joints"]
-    coordinates, links, models = document["coordinates"], chain["links"], document["models"]
+    coordinates, models, joints = document["coordinates"], document["models"], document["joints"]
     coupled = [name for name, model in models.items() if model["structure"] == "coupled"]
+    chain = document["chain"] if coupled else {"up": [0.0] * 3, "links": [NO_LINK]}
+    links = chain["links"]
     bodies = [_bodies(models[name], links) for name in coupled] or [[[0.0] * len(PARAMETERS)]]
     terms = [_terms(models[joint["model"]], joint["name"]) for joint in joints]
     rows = [

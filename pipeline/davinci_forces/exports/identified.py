@@ -23,7 +23,7 @@ from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
 from davinci_forces.maths.uncertainty.error_band import calibrate
-from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion
+from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.robot import Joint
@@ -101,12 +101,11 @@ class Export:
     def document(self) -> dict[str, Any]:
         """The model as JSON values."""
         robot, origin = self.study.robot, self.origin
-        coupled = any(isinstance(model, CoupledArm) for _, model in self.fits.values())
         return {
             "head": self.head(), "report_id": origin.report_id, "version": origin.version, "robot": robot.name,
             "simulated": self.study.simulated, "despite_verdict": list(origin.despite),
             "coordinates": [joint.name for joint in robot.joints], "gravity": GRAVITY,
-            "chain": _chain(robot.chain.with_coordinates(len(robot.joints))) if robot.chain and coupled else None,
+            "chain": _chain(robot.chain.with_coordinates(len(robot.joints))) if robot.chain else None,
             "models": {name: _model(*fit) for name, fit in self.fits.items()},
             "joints": [_joint(joint, origin.verdicts.get(joint.name)) for joint in self.joints],
         }  # fmt: skip
@@ -129,7 +128,10 @@ def _chain(chain: Chain) -> dict[str, Any]:
     rows = zip(*columns, chain.placement.tolist(), strict=True)
     names = ("name", "parent", "coordinate", "prismatic", "placement")
     links = [(name, i - 1 if i else None, None if k == FIXED else k, *more) for name, i, k, *more in rows]
-    return {"up": list(chain.up), "links": [dict(zip(names, link, strict=True)) for link in links]}
+    at = chain.names.index(chain.tip)
+    link = int(chain.body[at]) - 1
+    tip = {"link": link if link >= 0 else None, "position": chain.offset[at, :3, 3].tolist()}
+    return {"up": list(chain.up), "tip": tip, "links": [dict(zip(names, link, strict=True)) for link in links]}
 
 
 def _model(fit: Fit, model: Model) -> dict[str, Any]:
@@ -185,6 +187,8 @@ def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: S
             columns = (np.concatenate([getattr(m, name) for m in free]) for name in ("q_measured", "dq", "tau"))
             ranges = ([float(x.min()), float(x.max())] for x in columns)
             validity, online = dict(zip(UNITS, ranges, strict=True)), _filter(study, catalogue, joint, free)
+            if online:
+                online["static_friction"] = identified.static_friction(fit, joint.name)
             joints.append(ExportedJoint(joint.name, joint, fit, identified.model(fit), validity, online))
         elif names:
             raise BadRequest(f"{study.name}: joint {joint.name} has no model, since no identification log moves it")
@@ -200,6 +204,7 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
         spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
         unfitted = [space for space in spaces if space.role != "identification"] or spaces
         levels = [alarm_level([FreeMotionStatistics(s.free_rms, s.free_max, s.crossings)]) for s in unfitted]
+        levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
             "rate": tuned.rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],
             "initial_std": float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest])),

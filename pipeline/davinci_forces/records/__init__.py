@@ -7,6 +7,8 @@ from davinci_forces.records.forces import (
     FilterNoise,
     FreeMotion,
     FreeSpace,
+    Streamed,
+    StreamLevel,
     Threshold,
     Track,
     Tuning,
@@ -70,9 +72,9 @@ __all__ = [
     "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel", "Labels", "Links",
     "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin", "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
-    "Spectrum", "StabilityLimit", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
-    "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
-    "diagnostic",
+    "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
+    "TipBudget", "TipContact", "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning",
+    "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -83,7 +85,7 @@ KINDS: dict[str, type[Record]] = {
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
         FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        Comparison, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
+        Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

@@ -253,6 +253,50 @@ class Contact(LogJointRecord):
 
 
 @dataclass(frozen=True, eq=False)
+class Streamed(LogJointRecord):
+    """One joint of one log filtered as samples arrive, beside the smoother; a row is a contact."""
+
+    role: str
+    rate: float
+    stream_delay: float
+    free_rms: float
+    free_rms_std: float
+    stream_loss: float
+    stream_loss_std: float
+    free_max: float
+    crossings: float
+    peak_ratio: float
+    peak_ratio_std: float
+    onset: Column
+    duration: Column
+    smooth_peak: Column
+    peak: Column
+
+    def published(self) -> Iterator[Published]:
+        """The delay of the motion, the effort in free motion, and the peaks of long contacts over the smoother's."""
+        prefix = f"stream.{self.log}.{self.joint}"
+        yield from self.publish(prefix, "stream_delay")
+        yield from self.publish(prefix, "free_rms", "stream_loss", "peak_ratio", with_std=True)
+
+
+@dataclass(frozen=True, eq=False)
+class StreamLevel(JointRecord):
+    """The alarm level of one joint as samples arrive, over all its logs, and the contacts that exceed it."""
+
+    alarm_level: float
+    alarm_level_std: float
+    tested: int
+    stream_delay: float
+    contacts: int
+    contacts_found: int
+
+    def published(self) -> Iterator[Published]:
+        """The level, and how many contacts of the smoother exceed it."""
+        yield from self.publish(f"stream.{self.joint}", "alarm_level", with_std=True)
+        yield from self.publish(f"stream.{self.joint}", "contacts", "contacts_found")
+
+
+@dataclass(frozen=True, eq=False)
 class Comparison(LogJointRecord):
     """One filter on one joint of a log: its effort in free space, and its response to a push added in software.
 

@@ -17,14 +17,14 @@ REASONS = {  # why a number has no standard error -> patterns of its key; a stud
     "exact": (  # computed without noise from exact numbers
         "log.*.rate", "log.*.duration", "log.*.jitter", "log.*.longest_gap", "path.*", "fit.*.condition",
         "identifiability.*", "correlation.*", "search.*.excess", "excitation.*", "robot.worst_condition",
-        "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay",
+        "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay", "*.stream_delay",
         "stability.*.k_t_cqlf", "stability.*.k_t_switching",
     ),
     "stated": ("guess.*", "robot.link.*", "stability.*.hand_*", "stability.*.link_rate"),
     "count": (
         "log.*", "*.periods", "fit.*.samples", "fit.*.hac_lags", "choice.*.parameters", "search.*.searched",
         "search.*.swarms", "search.*.iterations", "contact.*.above", "contact.*.stated", "contact.*.found",
-        "tissue.*.pushes",
+        "tissue.*.pushes", "stream.*.contacts", "stream.*.contacts_found",
     ),
     "simulated truth": ("truth.*", "control.*", "haptics.*", "stability.*"),
     "p-value": ("*_p", "*_p_q", "*_p_dq", "*.white", "weight.*.agreement", "weight.*.agreement_mirrored"),

@@ -33,7 +33,7 @@ GROUPS = {
     "design": ("design",),
     "recordings": ("ingest", "resample", "average", "differentiate"),
     "model": ("fit", "choose", "predict"),
-    "forces": ("tune", "calibrate", "ekf", "assess", "measure", "benchmark", "whiteness"),
+    "forces": ("tune", "calibrate", "ekf", "assess", "measure", "stream", "benchmark", "whiteness"),
     "tip": ("resolve", "sense"),
     "weigh": ("weigh",),
     "tissue": ("palpate", "haptic-limits"),

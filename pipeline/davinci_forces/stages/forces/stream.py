@@ -1,0 +1,131 @@
+"""Measure what is lost if samples are filtered as they arrive, without later ones, as `davinci_forces.stream` does."""
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+
+import numpy as np
+
+from davinci_forces.filters import DEFAULT, diverges, filter_parts
+from davinci_forces.filters.online import Window, delay_of
+from davinci_forces.filters.problem import filter_inputs
+from davinci_forces.filters.response import noise_model
+from davinci_forces.identification.joint_models import LogModels
+from davinci_forces.identification.used import Identified
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
+from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.maths.signals.windows import free_space
+from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
+from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track
+from davinci_forces.robots.robot import Robot
+from davinci_forces.study import LogEntry
+
+ROLES = ("validation", "contact")
+MIN_SAMPLES = 100  # of free motion
+MEDIAN_STD = 1.2533  # standard error of a median over that of a mean, of normal values
+LONG = 3.0  # a contact is long if it lasts this multiple of the delay
+
+
+class CausalModels(LogModels):
+    """Models along a log whose motion is computed as a stream computes it, from a window around each sample."""
+
+    def joint_motion(self, joint: str, processing: tuple[float, float]) -> ArmMotion:
+        """Return the motion of one joint by the window of a cutoff [Hz], delayed by a lag [s]."""
+        key = joint, *processing
+        if key not in self._motions:
+            self._motions[key] = _motion(self._records[joint], *processing)
+        return self._motions[key]
+
+
+def _motion(record: Motion | JointModel, cutoff: float, lag: float) -> ArmMotion:
+    window = Window.of(record.rate, cutoff, lag - record.effort_lag)
+    columns = np.empty((3, len(record)))
+    for part in segments(record.segment):
+        smooth = window.along(record.q_measured[part])
+        if record.velocity == "logged":
+            smooth[1:] = window.along(record.dq_measured[part])[:2]
+        columns[:, part] = smooth
+    q, dq, ddq = columns[:, :, None]
+    return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)
+
+
+def run(
+    models: Sequence[JointModel],
+    motions: Collection[Motion],
+    fits: Iterable[Fit | FilterNoise],
+    estimates: Iterable[Track | Contact],
+    entry: LogEntry,
+    robot: Robot,
+    *,
+    q_tau: float,
+) -> Iterator[Streamed]:
+    """Filter the moving joints of a log sample by sample, and compare with the smoother and its contacts."""
+    if entry.role not in ROLES or not entry.has_known_free_motion:
+        return
+    records, estimates = list(fits), list(estimates)
+    noises = {noise.joint: noise for noise in records if isinstance(noise, FilterNoise)}
+    identified = Identified(robot, [fit for fit in records if isinstance(fit, Fit)])
+    along = CausalModels(identified, motions)
+    moving = [model for model in models if not model.at_rest and model.joint in noises]
+    late = delay_of([(model.rate, model.cutoff, model.effort_lag) for model in moving])
+    for model in moving:
+        fit = identified.fit_of(model.joint, f"{model.model}.{model.estimator}")
+        track = next((t for t in estimates if isinstance(t, Track) and t.joint == model.joint), None)
+        found = next((c for c in estimates if isinstance(c, Contact) and c.joint == model.joint), None)
+        if fit is not None and track is not None and len(track) == len(model):
+            noise = noises[model.joint]
+            causal = along.with_fit(model, fit)
+            estimate = filter_parts(
+                DEFAULT, filter_inputs(causal), noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau)
+            )
+            if not diverges(estimate):
+                yield from compare(track, estimate.tau_ext - track.day_offset, found, entry, late, noise.delay)
+
+
+def compare(
+    track: Track, tau_ext: Array, found: Contact | None, entry: LogEntry, late: float, delay: float
+) -> Iterator[Streamed]:
+    """Compare the streamed external effort (N,) of a joint in free motion and in contacts with the smoother's."""
+    free = free_space(track.t, entry.contact, track.rate, track.unscored)
+    if int(free.sum()) < MIN_SAMPLES:
+        return
+    statistics = free_motion_statistics(tau_ext, free, track.rate)
+    rms, rms_std = root_mean_square(tau_ext[free])
+    loss, loss_std = root_mean_square(tau_ext[free], track.tau_ext_smooth[free])
+    rows = np.flatnonzero(found.found).tolist() if found is not None else []
+    peaks = [streamed_peak(track.t, tau_ext, found, row, late + delay) for row in rows] if found is not None else []
+    columns = ("onset", "duration", "peak")
+    onset, duration, smooth = (getattr(found, name)[rows] if found is not None else np.zeros(0) for name in columns)
+    peak = np.array(peaks, np.float64)
+    long = duration > LONG * (late + delay)
+    ratios = peak[long] / smooth[long]
+    ratio = float(np.median(ratios)) if len(ratios) else float("nan")
+    ratio_std = MEDIAN_STD * float(np.std(ratios, ddof=1)) / len(ratios) ** 0.5 if len(ratios) > 1 else float("nan")
+    yield Streamed(
+        log=track.log, joint=track.joint, role=track.role, rate=track.rate, stream_delay=late, free_rms=rms,
+        free_rms_std=rms_std, stream_loss=loss, stream_loss_std=loss_std, free_max=statistics.largest,
+        crossings=statistics.crossings, peak_ratio=ratio,
+        peak_ratio_std=ratio_std, onset=onset, duration=duration, smooth_peak=smooth, peak=peak,
+    )  # fmt: skip
+
+
+def streamed_peak(t: Array, tau_ext: Array, contact: Contact, row: int, late: float) -> float:
+    """The largest streamed effort of the sign of a contact, from its onset to its release and the filter's delay."""
+    within = (t >= contact.onset[row]) & (t <= contact.release[row] + late)
+    sign = float(np.sign(contact.peak[row]))
+    return sign * float(np.max(sign * tau_ext[within], initial=0.0))
+
+
+def gather(streams: Iterable[Streamed]) -> Iterator[StreamLevel]:
+    """Compute the alarm level of each joint's stream, and count the contacts whose peak exceeds it."""
+    by_joint: dict[str, list[Streamed]] = {}
+    for stream in streams:
+        by_joint.setdefault(stream.joint, []).append(stream)
+    for joint, logs in by_joint.items():
+        levels = [alarm_level([FreeMotionStatistics(s.free_rms, s.free_max, s.crossings)]) for s in logs]
+        level, source = max(zip(levels, logs, strict=True), key=lambda pair: pair[0])
+        yield StreamLevel(
+            joint=joint, alarm_level=level, alarm_level_std=level * source.free_rms_std / source.free_rms,
+            tested=len(logs), stream_delay=max(s.stream_delay for s in logs), contacts=sum(len(s) for s in logs),
+            contacts_found=sum(int((np.abs(s.peak) > level).sum()) for s in logs),
+        )  # fmt: skip
