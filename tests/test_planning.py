@@ -161,6 +161,7 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
             "tune.gather",
             "calibrate.gather",
             "assess.gather",
+            "stream.gather",
             "resolve.gather",
             "haptic-limits",
         }

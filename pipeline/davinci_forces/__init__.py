@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
+    from davinci_forces.filters.online import Stream
     from davinci_forces.robots.robot import Robot
 
-__all__ = ["read", "results", "robot", "run"]
+__all__ = ["read", "results", "robot", "run", "stream"]
 __version__ = "0.2.0.dev0"  # pyproject.toml and the citation state it, too
 
 
@@ -86,3 +87,30 @@ def results(study: str | Path) -> "pd.DataFrame":
     from davinci_forces.runner.results.dataframes import results as read_results
 
     return read_results(Path(study))
+
+
+def stream(study: str | Path, joint: str | None = None, *, despite_verdict: bool = False) -> "Stream":
+    """Return the filter of a study for samples as they arrive: `stream("raw/mine").step(t, q, tau)`.
+
+    Everything that is not up to date runs first.  `step` takes the time [s], positions, efforts and, if measured,
+    velocities over all joints, or over one `joint`; a joint of a coupled arm takes all positions.  It returns the
+    external efforts with their standard deviations, contacts and the force at the tip.  Research use only: nothing here
+    connects to a robot.
+
+    Raises
+    ------
+    BadRequest
+        If a task fails, a joint has no model or no filter, or page one or a reviewer says no.
+    """
+    from davinci_forces.errors import BadRequest
+    from davinci_forces.filters.online import Stream
+    from davinci_forces.runner import runs
+    from davinci_forces.runner.results.exported import permitted_export
+
+    folders = runs.folders(runs.single_study(Path(study)), None, None)
+    if not run(study, quiet=True):
+        raise BadRequest(f"{study}: a task failed, so there is no filter; correct its log, or leave it out")
+    try:
+        return Stream(permitted_export(folders, [joint] if joint else [], despite_verdict).document())
+    except ValueError as error:
+        raise BadRequest(f"{study}: {error}") from error

@@ -122,7 +122,9 @@ def write_folder(folder: Path, contents: Mapping[str, bytes], replaces: bool = F
     try:
         write_together({partial / name: content for name, content in contents.items()})
         if os.path.lexists(folder):
-            names = os.listdir(folder) if folder.is_dir() and not folder.is_symlink() else [folder.name]
+            names = [folder.name]
+            if folder.is_dir() and not folder.is_symlink():
+                names = [path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()]
             foreign = [name for name in names if name not in contents or not (folder / name).is_file()]
             if foreign or not replaces:
                 raise NotAFile(0, f"it exists, and holds {(foreign or names)[0]!r}; name another folder", str(folder))

@@ -38,7 +38,7 @@ def test_every_file_says_where_it_comes_from_and_that_it_is_no_medical_device(na
     files = renderer(name)(small)
     assert files == renderer(name)(small)
     for file, text in files.items():
-        assert re.fullmatch(r"[a-z_.]+", file)
+        assert re.fullmatch(r"[a-z_./]+", file)
         for line in (ORIGIN.report_id, ORIGIN.version, SAFETY, "SIMULATED", f"exported despite: {ORIGIN.despite[0]}"):
             assert line in text, (file, line)
         assert "valid in the range of" in text or file.endswith("schema.json")

@@ -4,11 +4,10 @@ Research use, not a medical device: try at reduced effort with the stop in hand.
 """
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from davinci_forces import __version__
 from davinci_forces.exports import FORMATS
 from davinci_forces.runner.console import echo
 
@@ -34,6 +33,7 @@ def run(
     from davinci_forces.exports import renderer
     from davinci_forces.files import write_folder
     from davinci_forces.runner import ALL, runs
+    from davinci_forces.runner.results.exported import permitted_export
 
     folders = runs.folders(runs.single_study(study), processed, reports)
     place = out or Path(f"{folders.processed.name}-{to}")
@@ -46,38 +46,7 @@ def run(
         raise BadRequest(f"{place} exists; --replace replaces it, or --out names another folder")
     if not runs.run(folders.raw, ALL, processed, reports):
         raise BadRequest(f"{folders.raw}: a task failed, so nothing is exported; correct its log, or leave it out")
-    files = renderer(to)(_permitted(folders, joint or [], despite_verdict))
+    files = renderer(to)(permitted_export(folders, joint or [], despite_verdict))
     write_folder(place, {name: text.encode() for name, text in files.items()}, replace)
     for name in files:
         echo(f"see {place / name}")
-
-
-def _permitted(folders: Any, joints: list[str], despite_verdict: bool) -> Any:
-    """The export of joints, if neither a verdict of page one nor a reviewer forbids it, or despite that."""
-    from dataclasses import replace
-
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.exports.identified import ExportOrigin, export_of
-    from davinci_forces.files import read_bytes
-    from davinci_forces.records import KINDS
-    from davinci_forces.report.results import MANIFEST, identity
-    from davinci_forces.runner import reporting
-    from davinci_forces.runner.ledger import Ledger
-    from davinci_forces.runner.plan import Plan
-    from davinci_forces.runner.results import campaign
-    from davinci_forces.study import reading
-    from davinci_forces.study.review import STUDY
-
-    study, ledger = reading.read(folders.raw), Ledger(folders)
-    catalogue = reporting.catalogue(ledger, Plan(study, ledger).places().find(tuple(KINDS.values())))
-    verdicts = {j["joint"]: j["verdict"] for j in campaign.read_summary(folders.reports / "summary.json")["joints"]}
-    origin = ExportOrigin(__version__, identity(read_bytes(folders.reports / MANIFEST)), verdicts)
-    export = export_of(study, catalogue, origin, joints)
-    reasons = [f"joint {j.name} has the verdict Problem" for j in export.joints if verdicts.get(j.name) == "bad"]
-    used = {STUDY: {""}, "run": {log for fit, _ in export.fits.values() for log in fit.logs}}
-    for r in reporting.ratings(study):
-        if r.verdict == "reject" and r.name in used.get(r.subject, ()):
-            reasons.append(f"{' '.join([r.subject, r.name]).strip()} is rejected by {r.reviewer or 'a reviewer'}")
-    if reasons and not despite_verdict:
-        raise BadRequest(f"{folders.raw}: {'; '.join(reasons)}; --despite-verdict exports it, and every file says so")
-    return replace(export, origin=origin._replace(despite=tuple(reasons)))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-FORMATS = ("json", "urdf", "c")
+FORMATS = ("json", "urdf", "c", "ros2")
 
 
 def renderer(name: str) -> Callable[[Any], dict[str, str]]:

@@ -40,7 +40,7 @@ def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:
     """What stands for each @NAME@ in model.h and model.c."""
     coordinates, models, joints = document["coordinates"], document["models"], document["joints"]
     coupled = [name for name, model in models.items() if model["structure"] == "coupled"]
-    chain = document["chain"] if coupled else {"up": [0.0] * 3, "links": [NO_LINK]}
+    chain: Mapping[str, Any] = document["chain"] if coupled else {"up": [0.0] * 3, "links": [NO_LINK]}
     links = chain["links"]
     bodies = [_bodies(models[name], links) for name in coupled] or [[[0.0] * len(PARAMETERS)]]
     terms = [_terms(models[joint["model"]], joint["name"]) for joint in joints]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from davinci_forces.filters.sample import correct, first, predict, sign, transition
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 OK, STARTING, OUTSIDE_VALIDITY, BAD_INPUT = "ok", "starting", "outside validity", "bad input"
 FUNCTIONS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")  # of the coefficients of a term
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -43,7 +43,7 @@ Z_OF_MOTION: dict[str, Callable[[float, float], float]] = {
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ExternalEffort:
     """The external efforts on the joints (m,) at time t [s], which is `delay` before the newest sample.
 
     While the first window fills, and where the status of a joint is "bad input", numbers are NaN.  `contact` is 1 above
@@ -61,7 +61,7 @@ class Estimate:
     force: Array
 
 
-class Term(NamedTuple):
+class TermValue(NamedTuple):
     """A parameter's value, its factor of acceleration, coefficients (7,), and what its state z depends on."""
 
     value: float
@@ -170,7 +170,7 @@ class Window(NamedTuple):
     exact: Array  # (2 half + 1,)
 
     @classmethod
-    def of(cls, rate: float, cutoff: float, place: float) -> "Window":
+    def design(cls, rate: float, cutoff: float, place: float) -> "Window":
         """The window of a cutoff [Hz] for the instant `place` [s] before the newest sample."""
         half, before = half_width(rate, cutoff), place * rate
         middle = round(before)
@@ -184,7 +184,7 @@ class Window(NamedTuple):
         stop = len(samples) - self.middle + self.half
         return np.asarray(weights @ samples[stop - 2 * self.half - 1 : stop])
 
-    def along(self, x: Array) -> Array:
+    def filter_signal(self, x: Array) -> Array:
         """A signal (N,) and two derivatives at every sample, delayed by `place`; its ends are continued as they are."""
         before, after = self.half + self.middle, self.half + max(-self.middle, 0)
         padded = np.concatenate([np.full(before, x[0]), x, np.full(after, x[-1])])
@@ -284,14 +284,16 @@ class OnlineJoint:
         return tau_hat, now[2], math.sqrt(now[8]), max(math.sqrt(now[8]), total)
 
 
-def _term(p: Mapping[str, Any]) -> Term:
+def _term(p: Mapping[str, Any]) -> TermValue:
     state = p["state"] or {"kind": ""}
     kind = state["function"] if state["kind"] == "function" else state["kind"]
     scale = next((value for key, value in state.items() if key not in ("kind", "function")), 0.0)
-    return Term(p["value"], p["acceleration"], tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS), kind, scale)
+    return TermValue(
+        p["value"], p["acceleration"], tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS), kind, scale
+    )
 
 
-def _state(term: Term, memory: float, q: float, dq: float) -> float:
+def _state(term: TermValue, memory: float, q: float, dq: float) -> float:
     """The state z of a term; `memory` is that of a deflection."""
     if term.kind == "deflection":
         return memory
@@ -306,9 +308,9 @@ def _state(term: Term, memory: float, q: float, dq: float) -> float:
 class Stream:
     """The external efforts of an arm from samples as they arrive: `step(t, q, tau)`.
 
-    `model` is the content of an exported model.json.  Attributes: `coordinates`, the joints that `q`, `tau` and `dq`
-    are over; `joints`, those with estimates; `rate` [Hz] of the samples; `delay` [s] of the estimate; and `offset`,
-    an effort per joint that is subtracted, 0 unless it is set.
+    `model` is the content of an exported model.json.  `coordinates` are the joints that `q`, `tau` and `dq` are over,
+    and `joints` those with estimates.  `rate` [Hz] is that of the samples, and `delay` [s] that of the estimate.
+    `offset` is an effort per joint that is subtracted, 0 unless it is set.
 
     Raises
     ------
@@ -332,7 +334,7 @@ class Stream:
         self.has_tip = self.has_tip and all(j["units"]["effort"] in ("N m", "N") for j in joints)
         processing = [(self.rate, j["motion"]["cutoff"], j["motion"]["effort_lag"]) for j in joints]
         self.delay = max(delay_of(processing), 0.0)
-        self._windows = [Window.of(rate, cutoff, self.delay + lag) for rate, cutoff, lag in processing]
+        self._windows = [Window.design(rate, cutoff, self.delay + lag) for rate, cutoff, lag in processing]
         self._samples: deque[Any] = deque(maxlen=max(w.middle + w.half + 1 for w in self._windows))
         self._t = -math.inf
 
@@ -342,7 +344,7 @@ class Stream:
         for joint in self.filters:
             joint.restart()
 
-    def step(self, t: float, q: ArrayLike, tau: ArrayLike, dq: ArrayLike | None = None) -> Estimate:
+    def step(self, t: float, q: ArrayLike, tau: ArrayLike, dq: ArrayLike | None = None) -> ExternalEffort:
         """Take a sample at t [s]: positions, efforts and, if the arm measures them, velocities over `coordinates`.
 
         A sample that is not finite, or not later than the one before, leaves everything as it was.  After a gap of
@@ -362,13 +364,13 @@ class Stream:
             return self._unknown(t, STARTING)
         return self._estimate(t - self.delay)
 
-    def _unknown(self, t: float, status: str) -> Estimate:
+    def _unknown(self, t: float, status: str) -> ExternalEffort:
         m = len(self.joints)
         q, dq, tau_hat, tau_ext, std = (np.full(m, np.nan) for _ in range(5))
         none = np.full(m, -1, np.int64)
-        return Estimate(t - self.delay, (status,) * m, q, dq, tau_hat, tau_ext, std, none, np.full(3, np.nan))
+        return ExternalEffort(t - self.delay, (status,) * m, q, dq, tau_hat, tau_ext, std, none, np.full(3, np.nan))
 
-    def _estimate(self, t: float) -> Estimate:
+    def _estimate(self, t: float) -> ExternalEffort:
         columns = [np.array(column) for column in zip(*self._samples, strict=True)]
         q_all, tau_all, logged = columns[0], columns[1], columns[2] if len(columns) > 2 else None
         tau, rows, status = tau_all[-1 - round(self.delay * self.rate)], [], []
@@ -395,7 +397,7 @@ class Stream:
         values, contact = np.array([row[:5] for row in rows]).T, np.array([row[5] for row in rows], np.int64)
         force = self._force(values[0], values[3])
         q, dq, tau_hat, tau_ext, std = values
-        return Estimate(t, tuple(status), q, dq, tau_hat, tau_ext, std, contact, force)
+        return ExternalEffort(t, tuple(status), q, dq, tau_hat, tau_ext, std, contact, force)
 
     def _links_effort(self, joint: OnlineJoint, q: Array, dq: Array, ddq: Array) -> tuple[float, float]:
         """The effort of the links on a joint, and its inertia there; 0 of a joint by itself."""

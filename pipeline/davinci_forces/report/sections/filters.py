@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from davinci_forces import filters
-from davinci_forces.records import Comparison, FilterNoise, Track
+from davinci_forces.records import Comparison, FilterNoise, Streamed, Track
 from davinci_forces.report.content import (
     Block,
     Cell,
@@ -66,6 +66,8 @@ def blocks(context: Context) -> Iterator[Block]:
     if comparisons:
         compared = comparison(context, comparisons), overlay(comparisons), noise_over_delay(noises)
         yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
+    if logs := context.catalogue.records(Streamed):
+        yield stream_table(context, logs)
 
 
 def worst_track(context: Context, joint: str) -> Iterator[Track]:
@@ -128,6 +130,31 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
         ("Joint", "Worst free run", "RMS, smoother", "RMS, filter", "Level, smoother", "Level, filter", "Delay", "Lag"),
         rows,
         "real-time-cost",
+        "llrrrrrr",
+    )
+
+
+def stream_table(context: Context, logs: list[Streamed]) -> Table:
+    """Every log filtered as samples arrive, beside the smoother."""
+    names, of_joint = ("stream_delay", "free_rms", "stream_loss", "peak_ratio"), ("alarm_level", "contacts_found")
+    rows = tuple(
+        (
+            title(s.joint),
+            literal(s.log),
+            *(context.number(f"stream.{s.log}.{s.joint}.{name}", 2) for name in names),
+            *(context.number(f"stream.{s.joint}.{name}", 2) for name in of_joint),
+        )
+        for s in logs
+    )
+    return Table(
+        "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
+        "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
+        "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
+        "delays, over the smoother's. Alarm level: crossed in free motion at most once in ten minutes, of all logs of "
+        "the joint; and the number of measured contacts that exceed it.",
+        ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found"),
+        rows,
+        "stream",
         "llrrrrrr",
     )
 

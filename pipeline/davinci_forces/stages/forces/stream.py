@@ -1,4 +1,4 @@
-"""Measure what is lost if samples are filtered as they arrive, without later ones, as `davinci_forces.stream` does."""
+"""Measure what is lost if samples are filtered as they arrive, without later ones."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
@@ -38,12 +38,12 @@ class CausalModels(LogModels):
 
 
 def _motion(record: Motion | JointModel, cutoff: float, lag: float) -> ArmMotion:
-    window = Window.of(record.rate, cutoff, lag - record.effort_lag)
+    window = Window.design(record.rate, cutoff, lag - record.effort_lag)
     columns = np.empty((3, len(record)))
     for part in segments(record.segment):
-        smooth = window.along(record.q_measured[part])
+        smooth = window.filter_signal(record.q_measured[part])
         if record.velocity == "logged":
-            smooth[1:] = window.along(record.dq_measured[part])[:2]
+            smooth[1:] = window.filter_signal(record.dq_measured[part])[:2]
         columns[:, part] = smooth
     q, dq, ddq = columns[:, :, None]
     return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)

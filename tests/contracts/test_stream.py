@@ -1,0 +1,200 @@
+"""The filter as samples arrive: its numbers are those of the analysis, and bad samples leave it as it was."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.exports import renderer
+from davinci_forces.exports.identified import export_of
+from davinci_forces.filters import ekf, online
+from davinci_forces.filters.online import BAD_INPUT, STARTING, Links, OnlineJoint, Stream, Window, delay_of
+from davinci_forces.filters.problem import filter_inputs
+from davinci_forces.filters.response import noise_model
+from davinci_forces.identification.used import Identified
+from davinci_forces.maths.mechanics.kinematics import jacobian
+from davinci_forces.maths.models.memory import efforts
+from davinci_forces.records import Choice, Contact, FilterNoise, Fit, JointModel, Motion, Track
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
+from davinci_forces.stages.forces import stream as stage
+from tests.exported import ORIGIN, export, motion, motion_of
+
+T_S = 0.01
+
+
+@pytest.mark.parametrize("structure", ["independent", "coupled"])
+def test_effort_and_inertia_are_those_of_the_model_with_every_term(structure):
+    exported, moved = export(DAVINCI, structure), motion(3)
+    document = exported.document()
+    links = Links(document["chain"], document["gravity"])
+    for number, joint in enumerate(exported.joints):
+        of_model = motion_of(joint, moved)
+        row = joint.model.efforts.index(joint.name)
+        tau = efforts(joint.model, joint.fit.theta, of_model)[:, row]
+        [*dynamics] = joint.model.joint_dynamics(joint.fit.theta, of_model)
+        about = document["joints"][number]
+        tried = OnlineJoint(about, document["models"][about["model"]], document["coordinates"], links)
+        stream = Stream(document)
+        for k in range(len(moved.q)):
+            if k and moved.segment[k] != moved.segment[k - 1]:
+                tried.restart()
+            q, dq, ddq = (x[k] for x in moved[:3])
+            of_links, M = stream._links_effort(tried, q, dq, ddq)
+            own = q[number], dq[number], ddq[number]
+            tau_hat, *_ = tried.step((0.0, 0.0), own, 0.0, of_links, M)
+            assert tau_hat == pytest.approx(tau[k], abs=1e-11 * np.abs(tau).max())
+            M += sum(term.value * term.acceleration for term in tried.terms)
+            assert pytest.approx(dynamics[row].inertia[k], rel=1e-11) == M
+
+
+def test_the_force_at_the_tip_balances_the_efforts():
+    stream = Stream(export(DAVINCI, "coupled").document())
+    q, force = np.array([0.2, -0.3, 0.12]), np.array([1.0, -2.0, 0.5])
+    J, _ = jacobian(DAVINCI.chain, q)
+    assert_allclose(stream.links.tip_jacobian(q), J, atol=1e-14)
+    assert_allclose(stream._force(q, J.T @ force), force, rtol=1e-10)
+
+
+@pytest.fixture(scope="module")
+def small(lab, catalogue):
+    return export_of(lab.study, catalogue, ORIGIN)
+
+
+def samples_of(catalogue, log, names):
+    motions = {m.joint: m for m in catalogue.select(Motion, log=log)}
+    first = motions[names[0]]
+    return first, [np.stack([getattr(motions[n], x) for n in names], 1) for x in ("q_measured", "tau", "dq_measured")]
+
+
+def test_samples_one_by_one_give_what_the_study_measures_of_a_stream(lab, catalogue, small):
+    """The stage filters arrays; a stream filters samples: from one moment on, both are the same numbers."""
+    log = next(c.log for c in catalogue.records(Contact) if c.joint == "hand_roll")
+    stream = Stream(export_of(lab.study, catalogue, ORIGIN, ["hand_roll"]).document())
+    first, (q, tau, dq) = samples_of(catalogue, log, ["hand_roll"])
+    logged = dq if first.velocity == "logged" else [None] * len(q)
+    out = [stream.step(*sample) for sample in zip(first.t, q, tau, logged, strict=True)]
+    identified = Identified(lab.study.robot, [*catalogue.records(Fit), *catalogue.records(Choice)])
+    [model] = catalogue.select(JointModel, log=log, joint="hand_roll")
+    along = stage.CausalModels(identified, catalogue.select(Motion, log=log))
+    causal = along.with_fit(model, identified.fit_of("hand_roll", f"{model.model}.{model.estimator}"))
+    [tuned] = catalogue.select(FilterNoise, joint="hand_roll")
+    noise = noise_model(tuned, lab.study.robot.joint("hand_roll"), 1 / model.rate, lab.study.settings.q_tau)
+    [part] = filter_inputs(causal)
+    expected = ekf.track(part, noise).tau_ext
+    late = round(stream.delay * stream.rate)
+    ours, later = np.array([e.tau_ext[0] for e in out])[late:], slice(500, len(q) - late)
+    assert_allclose(ours[later], expected[later], atol=1e-3 * np.ptp(expected))
+    assert_allclose([e.t for e in out[late:]], first.t[: len(q) - late], atol=1e-9)
+    [streamed] = stage.compare(
+        next(t for t in catalogue.select(Track, log=log, joint="hand_roll")), expected, None,
+        next(e for e in lab.study.logs if e.name == log), stream.delay, tuned.delay,
+    )  # fmt: skip
+    assert streamed.stream_loss < 2.0
+
+
+def test_bad_samples_leave_everything_as_it_was(small):
+    stream, other = Stream(small.document()), Stream(small.document())
+    n = len(stream.coordinates)
+    random = np.random.default_rng(0)
+    for k in range(200):
+        q, tau = 0.1 * np.sin(0.02 * k + np.arange(n)), random.normal(size=n)
+        expected = other.step(k * T_S, q, tau)
+        if k % 10 == 5:
+            for t, bad_q, bad_tau in (
+                (np.nan, q, tau), (np.inf, q, tau), ((k - 1) * T_S, q, tau), ((k - 2) * T_S, q, tau),
+                (k * T_S, np.full(n, np.nan), tau), (k * T_S, q, np.full(n, np.inf)),
+            ):  # fmt: skip
+                assert stream.step(t, bad_q, bad_tau).status == (BAD_INPUT,) * len(stream.joints)
+        assert_allclose(stream.step(k * T_S, q, tau).tau_ext, expected.tau_ext, rtol=0, atol=0)
+    with pytest.raises(ValueError, match="one number for each of"):
+        stream.step(3.0, np.zeros(n + 1), np.zeros(n))
+
+
+def test_a_gap_starts_anew(small):
+    stream, other = Stream(small.document()), Stream(small.document())
+    n = len(stream.coordinates)
+    for k in range(100):
+        stream.step(k * T_S, np.full(n, 0.3), np.full(n, 5.0))
+    for k in range(300):
+        q, tau = 0.1 * np.sin(0.02 * k + np.arange(n)), np.cos(0.1 * k + np.arange(n))
+        ours, theirs = (s.step(start + k * T_S, q, tau) for s, start in ((stream, 5.0), (other, 0.0)))
+        assert ours.status == theirs.status
+        assert_allclose(ours.tau_ext, theirs.tau_ext, rtol=0, atol=0)
+    assert STARTING not in ours.status
+
+
+@pytest.mark.parametrize("place", [0.0, 0.05, 0.0537])
+def test_a_window_gives_a_cubic_and_its_derivatives_exactly(place):
+    window, rate = Window.design(100.0, 17.0, place), 100.0
+    t = np.arange(200) / rate
+    c = np.array([0.3, -1.0, 2.0, 0.7])
+    powers = [np.polynomial.Polynomial(c).deriv(d)(t - place) for d in range(3)]
+    interior = slice(40, 160)
+    for computed, exact in zip(window.filter_signal(np.polynomial.Polynomial(c)(t)), powers, strict=True):
+        assert_allclose(computed[interior], exact[interior], rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0])
+def test_a_window_passes_half_at_the_cutoff(rate):
+    half = online.half_width(rate, 17.0)
+    gains = [
+        online.weights(h, 0.0, rate)[0] @ np.cos(2 * np.pi * 17.0 / rate * np.arange(-h, h + 1))
+        for h in (half - 1, half)
+    ]
+    assert gains[0] > 0.5 >= gains[1]
+    assert delay_of([(rate, 17.0, 0.0)]) == pytest.approx(half / rate)
+    assert delay_of([(rate, 17.0, 0.02)]) == pytest.approx(half / rate - 0.02)
+
+
+def test_contacts_and_standstill_are_told(small):
+    stream = Stream(small.document())
+    n, filters = len(stream.coordinates), stream.filters
+    for k in range(400):
+        estimate = stream.step(k * T_S, np.full(n, 0.1), np.zeros(n))
+    still = [f.static for f in filters]
+    assert (estimate.std**2 >= np.array(still) ** 2 / 3.0).all()
+    for k in range(400, 900):
+        estimate = stream.step(k * T_S, np.full(n, 0.1), np.full(n, 50.0))
+    assert (estimate.contact[[f.alarm is not None for f in filters]] == 1).all()
+
+
+def test_the_package_for_ros_is_the_same_core(small, tmp_path):
+    """Without ROS, its core is imported beside the model, with numpy alone, and gives the same numbers."""
+    files = renderer("ros2")(small)
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+        if name.endswith(".py"):
+            compile(text, name, "exec")
+    assert {"package.xml", "setup.py", "setup.cfg", "davinci_forces_stream/node.py"} <= set(files)
+    script = """
+import json, math, sys
+sys.modules["davinci_forces"] = None  # not there
+from davinci_forces_stream.online import Stream
+stream = Stream(json.load(open("davinci_forces_stream/model.json")))
+n = len(stream.coordinates)
+for k in range(200):
+    e = stream.step(0.01 * k, [0.1 * math.sin(0.02 * k)] * n, [math.cos(0.1 * k)] * n)
+assert not {m.partition(".")[0] for m in sys.modules} & {"scipy", "numba", "pandas"}
+print(json.dumps([e.tau_ext.tolist(), e.std.tolist()]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, '.')\n{script}"], cwd=tmp_path,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    stream = Stream(small.document())
+    n = len(stream.coordinates)
+    for k in range(200):
+        e = stream.step(0.01 * k, [0.1 * np.sin(0.02 * k)] * n, [np.cos(0.1 * k)] * n)
+    assert_allclose(json.loads(done.stdout), [e.tau_ext, e.std], rtol=1e-9)
+
+
+def test_joints_of_several_rates_or_without_a_filter_are_refused(small):
+    document = small.document()
+    document["joints"][0]["filter"] |= {"rate": 77.0}
+    with pytest.raises(ValueError, match="need filters of one rate"):
+        Stream(document)
