@@ -1,16 +1,61 @@
 """Estimate the contact forces of a da Vinci arm from its motor currents, offline: from raw logs to reports."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     import pandas as pd
 
+    from davinci_forces.arrays import IdentifiedArm
     from davinci_forces.filters.online import Stream
     from davinci_forces.robots.robot import Robot
 
-__all__ = ["read", "results", "robot", "run", "stream"]
+__all__ = ["identify", "read", "results", "robot", "run", "stream"]
 __version__ = "0.2.0.dev0"  # pyproject.toml and the citation state it, too
+
+
+def identify(
+    robot: "str | Path | Robot",
+    t: Any,
+    q: Any,
+    tau: Any,
+    *,
+    period: "float | Sequence[float] | None" = None,
+    dq: Any = None,
+    joints: "str | Sequence[str] | None" = None,
+    settings: "Mapping[str, Any] | None" = None,
+) -> "IdentifiedArm":
+    """Identify the models of a robot's joints from arrays of free motion, as the stages do from a study's logs.
+
+    `robot` is a name, a .toml or .urdf file, or a Robot.  `t` (n,) is in s.  `q`, `tau` and, where measured, `dq` are
+    (n,) or (n, joints) in SI, arrays or pandas objects.  Lists of arrays are several logs.  `joints` names the columns;
+    without it, the names of a DataFrame do, or the columns are all joints of the robot.  `period` [s] is that of the
+    excitation, one for all logs or one a log; without it, it is detected.  `settings` are those of a study.
+
+    >>> arm = davinci_forces.identify("davinci", t, q, tau, joints="hand_roll")
+    >>> arm.parameters["parameter"].tolist()[:2]
+    ['inertia', 'gravity, sine']
+    >>> arm.predict(t, q)["hand_roll"].columns.tolist()
+    ['tau', 'std']
+    >>> effort = arm.external_effort(t, q, tau)
+    >>> effort.tau_ext.shape == effort.std.shape == (len(effort.t), 1)
+    True
+
+    Raises
+    ------
+    BadRequest
+        If arrays differ in length, are too short or hold NaN, or no joint can be identified; one message names all.
+    BadRobot
+        If there is no such robot, file or joint.
+    """
+    from davinci_forces.runner.processes import arithmetic
+
+    arithmetic.pin()
+    from davinci_forces import arrays
+
+    return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings)
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":

@@ -53,7 +53,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     robot = _with_tool(robot, table) if "tool" in table else robot
     robot = _with_base(robot, table) if "base" in table else robot
     remarks = _remarks(table.table("settings"))
-    settings = _settings(table.table("settings"), robot)
+    settings = settings_of(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     baseline = _baseline(table, folder)
     logs = entries_of(table, robot)
@@ -179,7 +179,8 @@ def _remarks(settings: TomlTable) -> tuple[str, ...]:
     )
 
 
-def _settings(table: TomlTable, robot: Robot | None) -> Settings:
+def settings_of(table: TomlTable, robot: Robot | None) -> Settings:
+    """Read [settings]; notes the problems of the table."""
     values = {field.name: _setting(table, field) for field in fields(Settings) if field.name != "effort"}
     efforts = table.table("effort")
     table.close(OUTDATED_SETTINGS)

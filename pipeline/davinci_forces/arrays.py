@@ -1,0 +1,352 @@
+"""Identify a robot, and estimate its external efforts, from arrays: the stages run on a study in a temporary folder."""
+
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from davinci_forces import robots
+from davinci_forces.errors import BadRequest
+from davinci_forces.filters.error_bands import total_variance
+from davinci_forces.identification.used import Identified
+from davinci_forces.maths.arrays import Array
+from davinci_forces.records import (
+    AnyRecord,
+    Choice,
+    Contact,
+    Diagnostic,
+    ErrorBand,
+    Fit,
+    JointModel,
+    Record,
+    Track,
+    store,
+)
+from davinci_forces.robots import Robot
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.results.dataframes import as_frame
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.study import LogEntry, Settings, Study
+from davinci_forces.study.entries import entries_of
+from davinci_forces.study.reading import settings_of
+from davinci_forces.toml import TomlTable
+from davinci_forces.toml.file import TomlFile
+
+IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
+NEW = "new"  # the log that is predicted, or whose external effort is estimated
+FITTED = "identification"
+MIN_SAMPLES = 50  # of a log
+
+Samples = Any  # an array, Series or DataFrame, or a list of those, one a log
+Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.q`, ...
+
+
+def identify(
+    robot: str | Path | Robot,
+    t: Samples,
+    q: Samples,
+    tau: Samples,
+    *,
+    period: float | Sequence[float] | None = None,
+    dq: Samples = None,
+    joints: str | Sequence[str] | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> "IdentifiedArm":
+    """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
+    table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
+    arm = robot if isinstance(robot, Robot) else robots.load(Path(robot).name, Path(robot).parent)
+    used = settings_of(table, arm)
+    refuse(table)
+    several = isinstance(t, list | tuple) and len(t) > 0 and np.ndim(t[0]) > 0
+    given = {name: x if several else [x] for name, x in (("q", q), ("tau", tau), ("dq", dq)) if x is not None}
+    times = list(t) if several else [t]
+    periods = [period] * len(times) if period is None or isinstance(period, int | float) else list(period)
+    for name, x in [*given.items(), ("period", periods)]:
+        if len(x) != len(times):
+            raise BadRequest(f"t has {len(times)} logs, but {name} has {len(x)}; give a list of as many for each")
+    moved = joints_of(arm, given["q"][0], [joints] if isinstance(joints, str) else joints)
+    problems: list[str] = []
+    columns = [
+        columns_of(log, {name: x[i] for name, x in given.items()}, moved, f"log {i + 1}: " if several else "", problems)
+        for i, log in enumerate(times)
+    ]
+    if problems:
+        raise BadRequest("\n".join(problems))
+    return IdentifiedArm(arm, used, moved, columns, periods)
+
+
+def refuse(table: TomlTable) -> None:
+    """Raise the problems of a table, one a line, without the lines of a file, as there is none."""
+    if table.file.noted:
+        raise BadRequest("\n".join(text for _, text in sorted(table.file.noted)))
+
+
+def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[str]:
+    """The joints of the columns of a position: as named, else by names of a DataFrame, else all joints of the robot.
+
+    Raises
+    ------
+    BadRequest
+        If neither names nor the number of columns tell the joints.
+    BadRobot
+        If the robot has no such joint.
+    """
+    names = [joint.name for joint in robot.joints]
+    labels = [str(label) for label in q.columns] if isinstance(q, pd.DataFrame) else []
+    width = 1 if np.ndim(q) == 1 else np.shape(q)[1] if np.ndim(q) == 2 else 0
+    chosen = list(joints) if joints is not None else labels if labels and set(labels) <= set(names) else names
+    if len(chosen) != width:
+        count = f"q has shape {np.shape(q)}, but there are {len(chosen)} joints: {', '.join(chosen)}"
+        raise BadRequest(f"{count}; give one column a joint, and name other joints with joints=[...]")
+    return [robot.joint(name).name for name in chosen]
+
+
+def columns_of(
+    t: Samples, values: Mapping[str, Samples], joints: Sequence[str], place: str, problems: list[str]
+) -> Columns:
+    """The channels of one log; adds to the problems what is wrong with its arrays, each with its name and number."""
+    columns = {"time": np.asarray(t, np.float64)}
+    before = len(problems)
+    if columns["time"].ndim != 1 or len(columns["time"]) < MIN_SAMPLES:
+        problems.append(f"{place}t has shape {columns['time'].shape}; give (n,) times, of at least {MIN_SAMPLES}")
+    for symbol, given in values.items():
+        named = isinstance(given, pd.DataFrame) and set(joints) <= set(given.columns)
+        array = np.asarray(given[list(joints)] if named else given, np.float64)
+        array = array[:, None] if array.ndim == 1 else array
+        if array.shape != (len(columns["time"]), len(joints)):
+            needed = f"t has {len(columns['time'])} samples, and {len(joints)} joints need as many columns"
+            problems.append(f"{place}{symbol} has shape {np.shape(given)}, but {needed}")
+            continue
+        columns |= {f"{joint}.{symbol}": array[:, i] for i, joint in enumerate(joints)}
+    for name, column in columns.items():
+        if len(missing := np.flatnonzero(~np.isfinite(column))):
+            which = f"{len(missing)} values that are not finite, the first at sample {missing[0]}"
+            problems.append(f"{place}{name} has {which}; remove these samples from all arrays")
+    if len(problems) == before and (late := np.flatnonzero(np.diff(columns["time"]) <= 0)).size:
+        problems.append(f"{place}t does not increase at sample {late[0] + 1}; sort the samples by time")
+    return columns
+
+
+class IdentifiedArm:
+    """The identified models of a robot's joints, which predict efforts and estimate external efforts.
+
+    `record` holds the Fit of each joint, `parameters` the same as a DataFrame, `diagnostics` the remarks of the stages.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Settings,
+        joints: Sequence[str],
+        logs: Sequence[Columns],
+        periods: Sequence[float | None],
+    ) -> None:
+        self.robot, self.joints, self._signals = robot, tuple(joints), sorted({n.rpartition(".")[2] for n in logs[0]})
+        home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
+        weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
+        folder = home / "raw" / "arrays"
+        folder.mkdir(parents=True)
+        names = [FITTED] if len(logs) == 1 else [f"{FITTED}-{i + 1}" for i in range(len(logs))]
+        entries = [self._saved(folder, *log) for log in zip(names, logs, periods, strict=True)]
+        self._study = Study(folder, "Arrays", robot, False, settings, tuple(entries))
+        self._places = folders(folder, None, None)
+        reading = self._run(IDENTIFIED)
+        identified = Identified(robot, [*reading(Fit), *reading(Choice)])
+        fits = {joint: identified.fit_of(joint, settings.fit) for joint in self.joints}
+        self.diagnostics = texts_of(reading(Diagnostic))
+        if not any(fits.values()):
+            raise BadRequest("\n".join(["no joint has a model", *self.diagnostics]))
+        self.fits: dict[str, Fit] = {joint: fit for joint, fit in fits.items() if fit}
+        self.models: tuple[JointModel, ...] = tuple(reading(JointModel))
+        self._bands = {band.joint: band for band in reading(ErrorBand)}
+
+    @property
+    def record(self) -> tuple[Fit, ...]:
+        """The frozen Fit of each joint, or of the whole arm."""
+        return tuple({fit.key: fit for fit in self.fits.values()}.values())
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """The parameters of each fit with their standard errors and units."""
+        columns = {"parameter": "parameter", "theta": "value", "theta_std": "std", "unit": "unit"}
+        frames = [as_frame(fit)[["group", "model", "estimator", *columns]] for fit in self.record]
+        return pd.concat(frames, ignore_index=True).rename(columns=columns)
+
+    def predict(self, t: Samples, q: Samples, dq: Samples = None) -> pd.DataFrame:
+        """Predict the effort of free motion: a row a time, columns (joint, `tau`) and (joint, `std`).
+
+        The standard deviation is that of the measured effort about it, smoothed, as calibrated on free motion.
+
+        Raises
+        ------
+        BadRequest
+            If the arrays are wrong, or no joint has a model.
+        """
+        values = {"q": q, "tau": np.zeros(np.shape(q))} | ({} if dq is None else {"dq": dq})
+        reading = self._run_on(t, values, PREDICTED)
+        models = [model for model in reading(JointModel) if model.log == NEW]
+        if not models:
+            raise BadRequest("\n".join(["the effort of no joint is predicted", *new_texts(reading)]))
+        predictions = {model.joint: self._prediction(model) for model in models}
+        return pd.concat(list(predictions.values()), keys=list(predictions), axis=1, names=["joint", ""])
+
+    def external_effort(self, t: Samples, q: Samples, tau: Samples, dq: Samples = None) -> "ExternalEffort":
+        """Estimate the effort that the robot exerts on its environment, and detect contacts.
+
+        Raises
+        ------
+        BadRequest
+            If the arrays are wrong, or no joint has a model.
+        """
+        reading = self._run_on(t, {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq}), MEASURED)
+        tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
+        texts = new_texts(reading)
+        if not tracks:
+            raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
+        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(map(self._effort_label, tracks)), texts)
+
+    def plot(self) -> Any:
+        """Plot the measured and the predicted effort of the logs that identified; returns the axes, one a joint."""
+        axes = axes_of(len(self.fits))
+        for ax, joint in zip(axes, self.fits, strict=True):
+            for i, model in enumerate(model for model in self.models if model.joint == joint):
+                ax.plot(model.t, model.tau, "C0", lw=0.7, label="" if i else "measured")
+                ax.plot(model.t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
+            ax.set_ylabel(self._effort_label(self.fits[joint], joint))
+            ax.set_title(joint, loc="left", fontsize="medium")
+        axes[0].legend(loc="upper right")
+        axes[-1].set_xlabel("time [s]")
+        return axes
+
+    def _repr_html_(self) -> str:
+        return as_html([self.parameters.set_index("group")], self.diagnostics)
+
+    def _effort_label(self, record: Any, joint: str = "") -> str:
+        return f"effort [{self.robot.joint(joint or record.joint).unit('{effort}')}]"
+
+    def _prediction(self, model: JointModel) -> pd.DataFrame:
+        std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
+        if band is not None:
+            smoothed = np.full(len(model), np.sqrt(np.mean(band.tau_ext_std_filter**2)))
+            std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False).variance)
+        return pd.DataFrame({"tau": model.tau_hat, "std": std}, index=pd.Index(model.t, name="t"))
+
+    def _saved(self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED) -> LogEntry:
+        """Save a log, and describe it as study.toml does."""
+        np.savez(folder / f"{name}.npz", **columns)  # type: ignore[arg-type]
+        log = {"name": name, "file": f"{name}.npz", "role": role, "channels": {column: column for column in columns}}
+        table = TomlTable({"log": [log | ({} if period is None else {"period": period})]}, TomlFile(name, {}))
+        [entry] = entries_of(table, self.robot)
+        refuse(table)
+        return entry
+
+    def _run_on(self, t: Samples, values: dict[str, Samples], stage: str) -> Any:
+        problems: list[str] = []
+        columns = columns_of(t, values, self.joints, "", problems)
+        if problems:
+            raise BadRequest("\n".join(problems))
+        return self._run(stage, self._saved(self._study.folder, NEW, columns, None, "contact"))
+
+    def _run(self, stage: str, *more: LogEntry) -> Any:
+        """Run the stages up to this one, without output; return what reads the records of a kind."""
+        study, lines = replace(self._study, logs=(*self._study.logs, *more)), list[str]()
+        runner = Runner(study, self._places, Console(lambda line, **style: None, lines.append))
+        if not runner.run([stage]):
+            raise BadRequest("\n".join(lines))
+
+        def read(kind: type[AnyRecord]) -> list[AnyRecord]:
+            places = runner.plan.places().find((kind,))
+            return [store.read(kind, self._places.processed, Path(place)) for _, place in places]
+
+        return read
+
+
+@dataclass(frozen=True, eq=False)
+class ExternalEffort:
+    """The external effort of the joints along a log: smoothed, with its standard deviation, and its contacts.
+
+    `record` holds the Track of each joint, which also has the effort of the filter without look-ahead.
+    """
+
+    record: tuple[Track, ...]
+    contact_record: tuple[Contact, ...]
+    labels: tuple[str, ...]
+    diagnostics: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def t(self) -> Array:
+        """Time (N,) [s] from the start of the log."""
+        return np.asarray(self.tau_ext.index)
+
+    @property
+    def tau_ext(self) -> pd.DataFrame:
+        """The external effort: a row a time, a column a joint."""
+        return by_joint({track.joint: (track.t, track.tau_ext_smooth) for track in self.record})
+
+    @property
+    def std(self) -> pd.DataFrame:
+        """The standard deviation of the external effort: a row a time, a column a joint."""
+        return by_joint({track.joint: (track.t, track.tau_ext_smooth_std) for track in self.record})
+
+    @property
+    def contacts(self) -> pd.DataFrame:
+        """The detected contacts: joint, onset and release [s], peak, mean and impulse with their standard errors."""
+        names = [name for name in Contact.columns() if name not in ("stated", "found")]
+        frames = [as_frame(contact)[["joint", *names]] for contact in self.contact_record]
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["joint", *names])
+
+    def plot(self) -> Any:
+        """Plot the external effort with its 95 % band and the contacts; returns the axes, one a joint."""
+        axes = axes_of(len(self.record))
+        for ax, track, label in zip(axes, self.record, self.labels, strict=True):
+            band = 1.96 * track.tau_ext_smooth_std
+            ax.fill_between(track.t, track.tau_ext_smooth - band, track.tau_ext_smooth + band, color="C0", alpha=0.25)
+            ax.plot(track.t, track.tau_ext_smooth, "C0", lw=1)
+            for contact in self.contacts[self.contacts["joint"] == track.joint].itertuples():
+                ax.axvspan(contact.onset, contact.release, color="C1", alpha=0.2)
+            ax.set_ylabel(f"external {label}")
+            ax.set_title(track.joint, loc="left", fontsize="medium")
+        axes[-1].set_xlabel("time [s]")
+        return axes
+
+    def _repr_html_(self) -> str:
+        return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)
+
+
+def by_joint(columns: Mapping[str, tuple[Array, Array]]) -> pd.DataFrame:
+    """Time series (N,) as a DataFrame with a column a joint."""
+    return pd.DataFrame({joint: pd.Series(x, pd.Index(t, name="t")) for joint, (t, x) in columns.items()})
+
+
+def axes_of(joints: int) -> Any:
+    """One axes a joint (joints,), below each other."""
+    from matplotlib import pyplot
+
+    return pyplot.subplots(joints, 1, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")[1][
+        :, 0
+    ]
+
+
+def new_texts(reading: Any) -> tuple[str, ...]:
+    """The texts of the diagnostics of the new log."""
+    return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
+
+
+def texts_of(diagnostics: Iterable[Record]) -> tuple[str, ...]:
+    """The texts of diagnostics, without duplicates."""
+    return tuple(dict.fromkeys(str(text) for d in diagnostics if isinstance(d, Diagnostic) for text in d.text))
+
+
+def as_html(tables: Sequence[pd.DataFrame], texts: Sequence[str]) -> str:
+    """Tables, with numbers of four digits, and a list of texts as HTML."""
+    from html import escape
+
+    parts = [table.to_html(float_format=lambda x: f"{x:.4g}") for table in tables]
+    return "".join([*parts, *(f"<p>{escape(text)}</p>" for text in texts)])

@@ -1,0 +1,198 @@
+"""From arrays to models and external efforts: the numbers of a study on the same arrays, and one message of errors."""
+
+import doctest
+import gc
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+import davinci_forces
+from davinci_forces.arrays import IdentifiedArm
+from davinci_forces.errors import BadRequest, BadRobot
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, JointModel, Record, Track, store
+from davinci_forces.runner import runs
+from tests import arm
+
+SHORT = {"periods": 6, "rate": 50.0}
+JOINT = "hand_roll"
+FIRST = arm.signal(JOINT, period=2.0, **SHORT)
+SECOND = arm.signal(JOINT, period=3.0, seed=1, **SHORT)
+PUSHED = arm.signal(JOINT, period=2.6, seed=2, external=lambda t: np.where((t > 4) & (t < 6), 1.0, 0.0), **SHORT)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A study of the same signals as files, written by hand."""
+    home = tmp_path_factory.mktemp("by-hand") / "raw" / "study"
+    logs = {"first": FIRST, "second": SECOND, "pushed": PUSHED}
+    tables = ['title = "By hand"\nrobot = "arm.toml"\nsimulated = true\n']
+    for name, signal in logs.items():
+        arm.write_csv(home / f"{name}.csv", [signal])
+        role = "contact" if name == "pushed" else "identification"
+        more = "period = 2.0" if name == "first" else ""
+        tables.append(arm.log_table(name, f"{name}.csv", role, [JOINT], more))
+    arm.write_robot(home)
+    (home / "study.toml").write_text("".join(tables))
+    assert davinci_forces.run(home, "measure", quiet=True)
+    return home
+
+
+@pytest.fixture(scope="module")
+def identified(folder) -> IdentifiedArm:
+    """What two arrays a log give, with the robot of the same file."""
+    t, q, dq, tau = ([getattr(log, name) for log in (FIRST, SECOND)] for name in ("t", "q", "dq", "tau"))
+    return davinci_forces.identify(folder / "arm.toml", t, q, tau, dq=dq, joints=JOINT, period=[2.0, None])
+
+
+def of_study(folder: Path, kind: type[Record]) -> list[Record]:
+    processed = runs.folders(folder, None, None).processed
+    files = sorted((processed / kind.folder()).rglob("*.parquet"))
+    return [store.read(kind, processed, file.relative_to(processed)) for file in files]
+
+
+def assert_equal_numbers(record: Record, expected: Record) -> None:
+    for name in record.columns():
+        if COLUMN_DTYPES[type(record).__dataclass_fields__[name].type] is np.object_:
+            assert getattr(record, name).tolist() == getattr(expected, name).tolist()
+        else:
+            assert_allclose(getattr(record, name), getattr(expected, name), rtol=1e-12, atol=1e-12)
+    for name in record.scalars():
+        value = getattr(record, name)
+        if isinstance(value, float):
+            assert_allclose(value, getattr(expected, name), rtol=1e-12, atol=1e-12)
+
+
+def test_the_parameters_are_those_of_a_study_on_the_same_arrays(folder, identified):
+    [fit] = identified.record
+    [same] = [f for f in of_study(folder, Fit) if f.key == fit.key]
+    assert_equal_numbers(fit, same)
+    frame = identified.parameters
+    assert_allclose(frame["value"], same.theta, rtol=1e-12)
+    assert_allclose(frame["std"], same.theta_std, rtol=1e-12)
+
+
+def test_the_external_effort_and_its_contacts_are_those_of_a_study_on_the_same_arrays(folder, identified):
+    effort = identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, dq=PUSHED.dq)
+    [same] = [track for track in of_study(folder, Track) if track.log == "pushed"]
+    assert_equal_numbers(effort.record[0], same)
+    assert_allclose(effort.tau_ext[JOINT], same.tau_ext_smooth, rtol=1e-12, atol=1e-12)
+    assert_allclose(effort.std[JOINT], same.tau_ext_smooth_std, rtol=1e-12)
+    assert_allclose(effort.t, same.t, rtol=1e-12)
+    [contact] = of_study(folder, Contact)
+    assert_equal_numbers(effort.contact_record[0], contact)
+    assert effort.contacts["joint"].tolist() == [JOINT] * len(contact)
+    assert_allclose(effort.contacts["peak"], contact.peak, rtol=1e-12)
+
+
+def test_the_predicted_effort_is_that_of_a_study_and_needs_no_effort(folder, identified):
+    [same] = [model for model in of_study(folder, JointModel) if model.log == "pushed"]
+    predicted = identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)[JOINT]
+    assert_allclose(predicted["tau"], same.tau_hat, rtol=1e-12, atol=1e-12)
+    assert_allclose(predicted.index, same.t, rtol=1e-12)
+
+
+def test_the_band_of_a_predicted_effort_holds_the_true_one_of_a_path_that_was_not_fitted(identified):
+    predicted = identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)[JOINT]
+    truth = regressor(arm.joint(JOINT).terms, *arm.excitation(JOINT, PUSHED.t, 2.6)) @ arm.THETA[JOINT]
+    error = np.abs(predicted["tau"] - truth)
+    assert np.mean(error < 1.96 * predicted["std"]) > 0.95
+    assert predicted["std"].max() < 0.5 * arm.NOISE[JOINT]  # so wide that the test says nothing
+
+
+def test_an_external_effort_leaves_the_models_and_the_predictions_as_they_are(identified):
+    before = identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)
+    identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau + 5.0, dq=PUSHED.dq)
+    pd.testing.assert_frame_equal(before, identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq), check_exact=True)
+
+
+def test_data_frames_give_the_numbers_of_arrays_with_joints_by_their_names():
+    logs = [arm.signal(name, period=2.0, seed=i, **SHORT) for i, name in enumerate((JOINT, "instrument_slide"))]
+    q, tau = (np.column_stack([getattr(log, name) for log in logs]) for name in ("q", "tau"))
+    names = [log.joint for log in logs]
+    by_array = davinci_forces.identify(arm.ARM, FIRST.t, q, tau, joints=names)
+    frames = pd.DataFrame(q, columns=names), pd.DataFrame(tau[:, ::-1], columns=names[::-1])
+    by_frame = davinci_forces.identify(arm.ARM, pd.Series(FIRST.t), *frames)
+    pd.testing.assert_frame_equal(by_array.parameters, by_frame.parameters, check_exact=True)
+    assert set(by_frame.fits) == set(names)
+    wrong = by_frame.external_effort(FIRST.t, frames[0], tau).tau_ext  # in the order of the joints
+    right = by_frame.external_effort(FIRST.t, *frames).tau_ext
+    pd.testing.assert_frame_equal(wrong, right, check_exact=True)
+
+
+def test_nothing_is_printed_and_the_folder_is_removed_with_the_object(capfd):
+    fitted = davinci_forces.identify(arm.ARM, FIRST.t, FIRST.q, FIRST.tau, joints=JOINT)
+    home = fitted._places.raw.parents[1]
+    assert home.is_dir()
+    assert capfd.readouterr() == ("", "")
+    del fitted
+    gc.collect()
+    assert not home.exists()
+
+
+def test_notebooks_show_parameters_efforts_and_contacts(identified):
+    effort = identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, dq=PUSHED.dq)
+    assert "gravity, sine" in identified._repr_html_()
+    html = effort._repr_html_()
+    assert html.count("<table") == 2
+    assert f"{effort.contacts['peak'][0]:.4g}" in html
+    [ax] = effort.plot()
+    assert ax.get_ylabel() == "external effort [N m]"
+    assert_allclose(ax.lines[0].get_ydata(), effort.tau_ext[JOINT])
+    assert len(ax.patches) == len(effort.contacts)
+    [ax] = identified.plot()
+    assert {text.get_text() for text in ax.get_legend().texts} == {"measured", "model"}
+
+
+LOG = {"t": FIRST.t, "q": FIRST.q, "tau": FIRST.tau, "joints": JOINT}
+HOLES = np.where(FIRST.t > 3.0, np.nan, FIRST.q)
+
+
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        ({"t": FIRST.t[:-1]}, ["q has shape (600,)", "tau has shape (600,)", "599 samples"]),
+        ({"q": HOLES, "tau": HOLES}, ["hand_roll.q has 449 values", "hand_roll.tau has 449", "first at sample 151"]),
+        ({name: LOG[name][:20] for name in ("t", "q", "tau")}, ["t has shape (20,)", "at least 50"]),
+        ({"t": FIRST.t[::-1]}, ["t does not increase at sample 1"]),
+        ({"q": np.zeros(600)}, ["no joint moves"]),
+        ({"joints": None}, ["q has shape (600,)", "3 joints", "joints=[...]"]),
+        ({"period": -1.0}, ["period must be positive, not -1.0"]),
+        ({"settings": {"lowpas": 3.0}}, ["unknown key 'lowpas'", "did you mean 'lowpass'?"]),
+        ({"t": [FIRST.t, SECOND.t], "q": [FIRST.q, SECOND.q], "tau": [FIRST.tau]}, ["2 logs, but tau has 1"]),
+        (
+            {"t": [FIRST.t, SECOND.t], "q": [FIRST.q, SECOND.q[1:]], "tau": [FIRST.tau, SECOND.tau]},
+            ["log 2: q has shape (899,)", "t has 900 samples"],
+        ),
+    ],
+)
+def test_wrong_arrays_are_refused_with_all_their_problems_in_one_message(change, texts):
+    with pytest.raises(BadRequest) as refused:
+        davinci_forces.identify(arm.ARM, **LOG | change)
+    assert [text for text in texts if text not in str(refused.value)] == []
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [({"robot": "elbow"}, "there is no robot 'elbow'"), ({"joints": ["elbow"]}, "no joint 'elbow'")],
+)
+def test_a_robot_or_joint_that_is_unknown_is_named(change, text):
+    with pytest.raises(BadRobot, match=text):
+        davinci_forces.identify(**{"robot": arm.ARM, **LOG, **change})
+
+
+@pytest.mark.parametrize("ask", ["predict", "external_effort"])
+def test_wrong_arrays_of_a_new_log_are_refused(identified, ask):
+    arrays = [PUSHED.t[:-1], PUSHED.q, PUSHED.tau][: 2 if ask == "predict" else 3]
+    with pytest.raises(BadRequest, match=r"q has shape \(780,\)"):
+        getattr(identified, ask)(*arrays)
+
+
+def test_the_example_in_the_docstring_runs():
+    names = {"davinci_forces": davinci_forces, **{name: LOG[name] for name in ("t", "q", "tau")}}
+    [example] = doctest.DocTestFinder().find(davinci_forces.identify, "identify", globs=names)
+    assert len(example.examples) >= 4
+    assert doctest.DocTestRunner().run(example).failed == 0
