@@ -39,6 +39,7 @@ from davinci_forces.records import (
     TipContact,
     TipForce,
     TissueModel,
+    TorqueConstant,
     Weight,
 )
 from davinci_forces.records.catalogue import Catalogue
@@ -245,6 +246,7 @@ def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those
     records += [
         made(Weight),
         made(FreeWeight),
+        made(TorqueConstant),
         made(Stiffness),
         made(TissueModel),
         guess,

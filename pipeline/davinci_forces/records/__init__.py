@@ -62,7 +62,7 @@ from davinci_forces.records.tissue import (
     Stiffness,
     TissueModel,
 )
-from davinci_forces.records.weight import FreeWeight, Load, Weight
+from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 
 __all__ = [
@@ -73,8 +73,8 @@ __all__ = [
     "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin", "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
-    "TipBudget", "TipContact", "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning",
-    "Weight", "Whiteness", "Workspace", "diagnostic",
+    "TipBudget", "TipContact", "TipForce", "TissueModel", "TorqueConstant", "Touch", "Track", "Trajectory",
+    "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -85,7 +85,7 @@ KINDS: dict[str, type[Record]] = {
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
         FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
+        TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

@@ -20,6 +20,7 @@ class Load(LogJointRecord):
     role: str
     rate: float
     period: float
+    is_current: int
     t: Column
     q: Column
     load: Column
@@ -81,6 +82,20 @@ class Weight(LogRecord):
             yield Published(f"{prefix}.mass_mirrored", "mirrored_alone", std="mirrored_alone_std", row=i)
             yield from self.publish(prefix, "false_mass", row=i)
             yield from self.publish(prefix, "joint_offset", "left_rms", "free_error", row=i, with_std=True)
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueConstant(LogJointRecord):
+    """The torque constant of a joint's motor that a known mass gives; a proposal, which no stage applies."""
+
+    stated_mass: float
+    torque_constant_used: float  # NaN where the effort is in A
+    torque_constant: float
+    torque_constant_std: float
+
+    def published(self) -> Iterator[Published]:
+        """The proposed constant."""
+        yield from self.publish(f"weight.{self.log}.{self.joint}", "torque_constant", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

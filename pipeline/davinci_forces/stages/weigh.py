@@ -1,4 +1,4 @@
-"""Estimate the mass on the arm from the joint efforts of a weight log, and its ratio to the stated mass."""
+"""Estimate the mass on the arm from the joint efforts of a weight log, and torque constants from a known mass."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,6 +11,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
     Agreement,
+    Constant,
     MassEstimate,
     Rows,
     agreement,
@@ -22,6 +23,7 @@ from davinci_forces.maths.contact.weighing import (
     offset,
     offset_std,
     residual,
+    scaled_constant,
     shares,
     unit_load,
     widening_factor,
@@ -32,8 +34,17 @@ from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
-from davinci_forces.robots.robot import Robot
+from davinci_forces.records import (
+    Diagnostic,
+    FreeWeight,
+    JointModel,
+    Load,
+    Motion,
+    TorqueConstant,
+    Weight,
+    diagnostic,
+)
+from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 
 FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing touches the arm
@@ -43,6 +54,7 @@ MIN_ROWS = 2 * PARTS  # rows of a path in each joint
 MAX_TARE_DISTANCE = 0.1  # between the paths of a log and its tare, over the standard deviation of the position
 PHASES = 1000  # phases of a period at which two paths are compared
 MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, relative to the period
+MAX_RELATIVE_ERROR = 1 / 3  # standard error over the mass, up to which a torque constant is proposed
 MIN_SIDE_DIFFERENCE = 2.0  # [standard errors] by which the better side of a link must explain the effort better
 
 
@@ -58,8 +70,8 @@ def run(
     """Compute the joint effort per kilogram of each mass, along its weight log and along free motion.
 
     One Load per weight and moving joint.  Its effort is measured minus modelled effort, not the filter's effort, whose
-    lag and random walk would bias the mass.  Joints that the log does not hold are taken to be at 0.  Joints whose
-    effort is in A are left out, because a current is not a force.
+    lag and random walk would bias the mass.  Joints that the log does not hold are taken to be at 0.  Of a joint whose
+    effort is in A, the load is the current of a motor with a torque constant of 1 N m/A.
     """
     relevant = [w for w in weighings.each if entry.role in FREE_ROLES or w.log == entry.name]
     if relevant and robot.chain is None:
@@ -67,27 +79,32 @@ def run(
         yield diagnostic("weigh", entry.name, "note", f"{message}; no mass is estimated")
         return
     moving = [model for model in models if not model.at_rest and len(model) == len(motions[0])]
-    loaded = [model for model in moving if not robot.joint(model.joint).effort]
-    if entry.role not in FREE_ROLES and len(loaded) < len(moving):
-        names = ", ".join(model.joint for model in moving if model not in loaded)
+    if entry.role not in FREE_ROLES and (currents := [m.joint for m in moving if robot.joint(m.joint).effort]):
+        names = ", ".join(currents)
         message = f"{entry.name}: the effort of {names} is a current, not a force, and is left out"
         yield diagnostic("weigh", entry.name, "note", f"{message}; state torque_constant where it is known")
-    if not relevant or not loaded or robot.chain is None:
+    if not relevant or not moving or robot.chain is None:
         return
+    measured = {source.joint for source in entry.channels if source.symbol == "i"}
     motion = whole_motion(motions, robot)
-    period = period_of([m for m in motions if m.joint in {model.joint for model in loaded}], robot)
-    efforts = {model.joint: external_effort(model, model.tau_hat, lowpass) for model in loaded}
+    period = period_of([m for m in motions if m.joint in {model.joint for model in moving}], robot)
+    efforts = {model.joint: external_effort(model, model.tau_hat, lowpass) for model in moving}
     unseen = efforts
     if entry.role == "identification":
-        unseen = {model.joint: external_effort(model, model.tau_hat_unseen, lowpass) for model in loaded}
+        unseen = {model.joint: external_effort(model, model.tau_hat_unseen, lowpass) for model in moving}
     for weighing in relevant:
         sides = loads_per_kilogram(robot.chain, robot, weighing.weight, motion)
-        for model in loaded:
+        for model in moving:
+            joint = robot.joint(model.joint)
+            per_current = joint.gear_ratio if joint.effort else 1.0
             column = [joint.name for joint in robot.joints].index(model.joint)
             first = float(model.t[0]) - 0.5 / model.rate  # a sample is in the middle of its time
             length = period or float(model.t[-1]) + 0.5 / model.rate - first
             count = max(int(length * min(model.rate, ROWS_PER_CUTOFF_PERIOD * lowpass) * (1 + 1e-9)), 1)
-            loads = [lowpass_segments(side[:, column], motions[0].segment, model.rate, lowpass) for side in sides]
+            loads = [
+                lowpass_segments(side[:, column] / per_current, motions[0].segment, model.rate, lowpass)
+                for side in sides
+            ]
             columns = {
                 "q": path_means(model.t, motion[0][:, column], first, length, count),
                 "load": path_means(model.t, loads[0], first, length, count),
@@ -98,7 +115,7 @@ def run(
             reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
             yield Load(
                 log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
-                period=period, t=((np.arange(count) + 0.5) / count * length)[reached],
+                period=period, is_current=int(bool(joint.effort) or joint.name in measured), t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
 
@@ -160,19 +177,25 @@ def path_means(t: Array, x: Array, first: float, length: float, count: int) -> A
     return np.where(samples > 0, sums / np.maximum(samples, 1), np.nan)
 
 
-def gather(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterator[Weight | FreeWeight | Diagnostic]:
+def gather(
+    loads: Iterable[Load], robot: Robot, weighings: Weighings
+) -> Iterator[Weight | FreeWeight | TorqueConstant | Diagnostic]:
     """Estimate one Weight per weight log, and one FreeWeight per log of free motion, without a mass.  Section 7.5
 
-    Joints whose effort is in A are left out, because a current is not a force.
+    Joints whose effort is in A are left out, because a current is not a force.  A known mass gives the torque constant
+    of each joint whose current was measured.
     """
     by_weight = defaultdict(list)
     for load in loads:
-        if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD and not robot.joint(load.joint).effort:
+        if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD:
             by_weight[load.weight, load.log].append(load)
     units = {joint.name: joint.unit("{effort}") for joint in robot.joints}
     for weighing in weighings.each:
-        weight_loads = by_weight[weighing.log, weighing.log]
+        carrying = by_weight[weighing.log, weighing.log]
         logs = {log: ls for (weight, log), ls in by_weight.items() if weight == weighing.log and log != weighing.log}
+        tare, fault = subtract_tare(carrying, logs.get(weighing.tare, [])) if weighing.tare and carrying else ([], "")
+        yield from torque_constants(weighing, carrying, tare, logs, robot)
+        weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
             message = f"{weighing.log}: no moving joint carries the mass on {weighing.weight.moves_with}"
             yield diagnostic(
@@ -181,11 +204,50 @@ def gather(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterato
                 "joint that the mass loads, and state torque_constant where it is known",
             )  # fmt: skip
             continue
-        tare, fault = subtract_tare(weight_loads, logs.get(weighing.tare, [])) if weighing.tare else ([], "")
         if fault:
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
         yield from estimate_mass(weighing, weight_loads, tare, logs, units)
+
+
+def torque_constants(
+    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], robot: Robot
+) -> Iterator[TorqueConstant | Diagnostic]:
+    """Propose the torque constant of each joint whose current was measured, so that it carries the known mass.
+
+    No stage applies it.  A joint whose current shows the mass with a larger relative error than
+    `MAX_RELATIVE_ERROR` is left out.
+    """
+    for i, load in enumerate(loads if weighing.weight.mass else ()):
+        joint, free = robot.joint(load.joint), free_motion_errors([load], logs)
+        [row] = rows_of([tare[i] if tare else load], {}, "load")
+        run, false = fit_mass([row]), 0.0 if tare else free.false_mass.get(load.joint, 0.0)
+        apparent = MassEstimate(run.mass, float(np.hypot(run.std, false)))
+        if not load.is_current or not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
+            continue
+        assert weighing.weight.mass
+        constant = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)
+        stated = float("nan") if joint.effort else joint.torque_constant
+        yield TorqueConstant(weighing.log, load.joint, weighing.weight.mass, stated, constant.value, constant.std)
+        yield diagnostic(
+            "weigh", f"{weighing.log}.{load.joint}.torque-constant", "note",
+            proposal(f"{weighing.log}/{load.joint}", weighing.weight.mass, constant, stated, joint),
+        )  # fmt: skip
+
+
+def proposal(name: str, mass: float, constant: Constant, stated: float, joint: Joint) -> str:
+    """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
+    text = (
+        f"{name}: the known mass of {mass:g} kg gives torque_constant = {constant.value:.3g} ± {constant.std:.2g} N m/A "
+        f"with gear_ratio = {joint.gear_ratio:g}"
+    )
+    if constant.value < 0:
+        return f"{text}; it is negative, so check the sign of the current and the position of the mass"
+    if np.isnan(stated):
+        return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
+    away = abs(constant.value - stated) / constant.std
+    verdict = "which agrees" if away <= NORMAL_95 else "which differs: check mass, position, gear and motor"
+    return f"{text}; {stated:g} is used, {away:.1f} standard errors away, {verdict}; the proposal is not applied"
 
 
 class FreeMotionErrors(NamedTuple):

@@ -58,6 +58,13 @@ class MassEstimate(NamedTuple):
     std: float
 
 
+class Constant(NamedTuple):
+    """A torque constant and its standard error [N m/A]."""
+
+    value: float
+    std: float
+
+
 class Agreement(NamedTuple):
     """Whether the masses that joints tell alone agree: the probability of their chi-square if they do."""
 
@@ -84,6 +91,15 @@ def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
         numerator += float(x @ y) / row.sigma**2
         denominator += float(x @ x) / row.sigma**2
     return numerator / denominator if denominator > 0 else float("nan")
+
+
+def scaled_constant(constant: float, known_mass: float, apparent: MassEstimate) -> Constant:
+    """The torque constant with which a known mass [kg] has the effort that it showed.
+
+    K = K_0 m / m_0,    s_K = |K| s_0 / |m_0|,    m_0 the mass that appears with the constant K_0
+    """
+    value = constant * known_mass / apparent.mass
+    return Constant(value, abs(value * apparent.std / apparent.mass))
 
 
 def agreement(masses: Sequence[MassEstimate]) -> Agreement:

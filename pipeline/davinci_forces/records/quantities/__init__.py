@@ -21,7 +21,7 @@ STANDARD_ERRORS = (  # of these symbols, whose names end in _std
     "mass_mirrored", "mass_scale", "tare_mass", "mass_alone", "mirrored_alone", "free_mass", "force_rms", "force_level",
     "force_detection", "force_coverage", "model_force", "total_force", "sigma_1", "sigma_2", "sigma_3", "force_error",
     "force_bias", "force_relative_error", "sensor_lag", "sensor_coverage", "band_rms", "onset_depth", "error",
-    "filter_lag", "filter_share", "period", "score", "model_error", "mean_error",
+    "filter_lag", "filter_share", "period", "score", "model_error", "mean_error", "torque_constant",
 )  # fmt: skip
 QUANTITIES = MEASURED | {
     f"{name}_std": Quantity(f"standard error: {MEASURED[name].meaning}", MEASURED[name].unit)

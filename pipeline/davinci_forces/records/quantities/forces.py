@@ -39,8 +39,11 @@ FORCES = {
     "above": Quantity("1 when the peak exceeds the detection level, else 0"),
     # masses on the arm
     "weight": Quantity("weight log that the load belongs to", ""),
-    "load": Quantity("effort per kilogram, at the place of the mass in the weight log", "{effort}/kg"),
+    "load": Quantity("effort per kilogram, at the place of the mass; in A, at 1 N m/A", "{effort}/kg"),
     "load_mirrored": Quantity("effort per kilogram, on the opposite side of the link", "{effort}/kg"),
+    "is_current": Quantity("1 when the effort was measured as a motor current, else 0"),
+    "torque_constant": Quantity("torque constant of the motor that the known mass gives", "N m/A"),
+    "torque_constant_used": Quantity("torque constant of the motor by which the effort was computed", "N m/A"),
     "tau_ext_unseen": Quantity("external effort from fits without this part of the path", "{effort}"),
     "moves_with": Quantity("joint or link that the mass moves with", ""),
     "tare": Quantity("log that was subtracted as tare", ""),
