@@ -9,21 +9,24 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.contact.weighing import (
     MIN_AGREEMENT,
     PARTS,
+    Constant,
     MassEstimate,
     Rows,
     agreement,
     better,
     fit_mass,
     offset,
+    pooled_std,
+    scaled_constant,
     unit_load,
     widening_factor,
 )
 from davinci_forces.maths.periods.shift import circular, roll, straight
-from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
+from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, TorqueConstant, Weight
 from davinci_forces.report.sections.weight import SIDES
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.stages import weigh
-from davinci_forces.study import AttachedMass, Weighing, Weighings
+from davinci_forces.study import AttachedMass, Source, Weighing, Weighings
 from tests import arm
 from tests.arm import ARM
 from tests.test_averaging import entry
@@ -159,18 +162,23 @@ def described(one):
 
 def analysed(logs, weighing, robot=ROBOT):
     """What both stages make of logs: by kind."""
+    made, texts = weighed(logs, weighing, robot)
+    weights = [record for record in made if isinstance(record, Weight)]
+    free = {record.log: record for record in made if isinstance(record, FreeWeight)}
+    return (weights[0] if weights else None), free, texts
+
+
+def weighed(logs, weighing, robot=ROBOT, channels=()):
+    """All records that both stages make of logs, and the texts of their diagnostics."""
     about = Weighings((weighing,))
     loads, said = [], []
     for models, motions in logs:
-        first = motions[0]
-        its = entry(name=first.log, role=first.role, weight=weighing.weight if first.log == weighing.log else None)
+        first, weight = motions[0], weighing.weight if motions[0].log == weighing.log else None
+        its = entry(name=first.log, role=first.role, weight=weight, channels=channels)
         for record in weigh.run(models, motions, its, robot, about, lowpass=17.0):
             (loads if isinstance(record, Load) else said).append(record)
     made = list(weigh.gather(loads, robot, about))
-    weights = [record for record in made if isinstance(record, Weight)]
-    free = {record.log: record for record in made if isinstance(record, FreeWeight)}
-    texts = [text for d in (*said, *made) if isinstance(d, Diagnostic) for text in d.text]
-    return (weights[0] if weights else None), free, texts
+    return made, [text for d in (*said, *made) if isinstance(d, Diagnostic) for text in d.text]
 
 
 def study(seed, tare="", position=HUNG.position, tare_path=0.0):
@@ -386,3 +394,105 @@ def test_a_model_without_any_error_tells_the_mass_exactly(monkeypatch):
     # Central differences err by (w T_s)^2 / 6, 2e-4 of what the fastest acceleration asks for.
     assert weight.mass == pytest.approx(MASS, rel=2e-4)
     assert max(abs(f.free_mass) for f in free.values()) < 1e-12
+
+
+# The torque constant that a known mass gives
+
+CONSTANTS, GEAR = {"hand_roll": 0.0438, "hand_pitch": 0.05, "instrument_slide": 0.05}, 200.0
+CURRENTS = tuple(Source(f"{joint}.i", joint, "current") for joint in JOINTS)
+
+
+def by_current(seed=0, stated=0.04, tare="", channels=CURRENTS, mass=MASS):
+    """The constants of a weight log whose currents were measured, by joint, and the diagnostics.
+
+    The study states a constant of all motors, or None: then the efforts are currents.
+    """
+    driven = {"effort": "A"} if stated is None else {"torque_constant": stated}
+    robot = replace(ROBOT, joints=tuple(replace(joint, gear_ratio=GEAR, **driven) for joint in ROBOT.joints))
+    logs = [
+        log("fitted", "identification", 100 + seed),
+        log("other", "validation", 200 + seed, path=0.8),
+        log("empty", "validation", 300 + seed, t=T[: len(T) - 137] + 1.37),
+        log("heavy", "weight", 300 + seed, HUNG.position),
+    ]
+    currents = [
+        (
+            [
+                replace(m, tau=m.tau / (GEAR * CONSTANTS[m.joint]) * (1.0 if stated is None else GEAR * stated))
+                for m in ms
+            ],
+            x,
+        )
+        for ms, x in logs
+    ]
+    made, texts = weighed(currents, Weighing("heavy", replace(HUNG, mass=mass), tare), robot, channels)
+    return {record.joint: record for record in made if isinstance(record, TorqueConstant)}, texts
+
+
+@pytest.mark.medium
+def test_intervals_of_torque_constants_hold_the_true_ones_at_the_stated_rate():
+    found = [constant for seed in range(24) for constant in by_current(seed)[0].values()]
+    assert {constant.joint for constant in found} == {"hand_roll", "hand_pitch"}  # the slide carries none of it
+    off = np.array([(of.torque_constant - CONSTANTS[of.joint]) / of.torque_constant_std for of in found])
+    assert len(off) == 48
+    assert np.mean(np.abs(off) < 1.96) > 0.86  # 48 draws of 95 % fall below 42 once in hundreds
+    assert 0.7 < np.std(off) < 1.3
+
+
+@pytest.mark.parametrize("stated", [None, 0.02, 0.0438])
+def test_the_proposed_constant_does_not_depend_on_the_one_in_use_and_is_not_applied(stated):
+    reference, found = by_current(2)[0]["hand_roll"], by_current(2, stated)[0]["hand_roll"]
+    assert found.torque_constant == pytest.approx(reference.torque_constant, rel=1e-9)
+    assert found.torque_constant_std == pytest.approx(reference.torque_constant_std, rel=1e-9)
+    assert (found.torque_constant_used, found.stated_mass) == (pytest.approx(stated or np.nan, nan_ok=True), MASS)
+
+
+def test_the_diagnostic_says_the_constant_its_error_and_that_it_is_not_applied():
+    for stated, words in ((None, 'in place of effort = "A"'), (0.0438, "which agrees"), (0.02, "which differs")):
+        constants, said = by_current(2, stated)
+        of = constants["hand_roll"]
+        [text] = [text for text in said if "heavy/hand_roll: the known mass" in text]
+        value = f"torque_constant = {of.torque_constant:.3g} ± {of.torque_constant_std:.2g} N m/A with gear_ratio = 200"
+        assert [part for part in (value, words, "not applied") if part not in text] == []
+
+
+def test_a_tare_leaves_the_noise_as_the_error_of_a_constant():
+    plain, tared = (by_current(3, tare=tare)[0]["hand_pitch"] for tare in ("", "empty"))
+    assert tared.torque_constant_std < 0.2 * plain.torque_constant_std
+    assert abs(tared.torque_constant - CONSTANTS["hand_pitch"]) < 1.96 * tared.torque_constant_std
+
+
+@pytest.mark.parametrize("change", [{"channels": ()}, {"mass": None}], ids=["efforts", "unknown mass"])
+def test_without_currents_or_a_known_mass_no_constant_is_proposed(change):
+    assert by_current(0, **change)[0] == {}
+
+
+def test_a_constant_that_the_mass_hardly_shows_is_not_proposed(monkeypatch):
+    monkeypatch.setattr(weigh, "MAX_RELATIVE_ERROR", 0.06)
+    precise = {joint: c.torque_constant_std / c.torque_constant for joint, c in by_current(0)[0].items()}
+    assert set(precise) == {"hand_roll"}
+    assert precise["hand_roll"] <= 0.06
+
+
+def test_a_negative_constant_asks_for_the_sign_of_the_current():
+    channels = tuple(replace(source, sign=-1) for source in CURRENTS)
+    driven = replace(ROBOT, joints=tuple(replace(joint, gear_ratio=-GEAR, effort="A") for joint in ROBOT.joints))
+    logs = [log("fitted", "identification", 100), log("heavy", "weight", 300, HUNG.position)]
+    made, said = weighed(logs, Weighing("heavy", HUNG, ""), driven, channels)
+    assert [record.torque_constant < 0 for record in made if isinstance(record, TorqueConstant)] == [True, True]
+    assert sum("check the sign of the current" in text for text in said) == 2
+
+
+def test_the_error_of_a_mass_pools_the_run_with_free_motion_and_widens_by_what_that_shows():
+    """Against Student's table: 2.571 for 5 degrees of freedom, 2.131 for 15."""
+    run = MassEstimate(0.2, 0.01)
+    assert pooled_std(run, []) == pytest.approx(0.01 * 2.571 / 1.96, rel=1e-3)
+    small = [MassEstimate(0.012, 0.01), MassEstimate(-0.008, 0.02)]
+    pooled = np.sqrt((0.01**2 + 0.01**2 + 0.02**2) / 3)
+    assert pooled_std(run, small) == pytest.approx(pooled * 2.131 / 1.96, rel=1e-3)
+    large = [MassEstimate(0.1, 0.01), MassEstimate(-0.1, 0.02)]
+    assert pooled_std(run, large) == pytest.approx(0.1 * 2.131 / 1.96, rel=1e-3)
+
+
+def test_a_constant_with_which_the_mass_is_twice_the_known_one_is_twice_too_large():
+    assert scaled_constant(0.08, 0.2, MassEstimate(0.4, 0.04)) == pytest.approx(Constant(0.04, 0.004))

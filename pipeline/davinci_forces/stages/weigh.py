@@ -22,6 +22,7 @@ from davinci_forces.maths.contact.weighing import (
     moved_with,
     offset,
     offset_std,
+    pooled_std,
     residual,
     scaled_constant,
     shares,
@@ -115,7 +116,8 @@ def run(
             reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
             yield Load(
                 log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
-                period=period, is_current=int(bool(joint.effort) or joint.name in measured), t=((np.arange(count) + 0.5) / count * length)[reached],
+                period=period, is_current=int(bool(joint.effort) or joint.name in measured),
+                t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
 
@@ -219,10 +221,11 @@ def torque_constants(
     `MAX_RELATIVE_ERROR` is left out.
     """
     for i, load in enumerate(loads if weighing.weight.mass else ()):
-        joint, free = robot.joint(load.joint), free_motion_errors([load], logs)
-        [row] = rows_of([tare[i] if tare else load], {}, "load")
-        run, false = fit_mass([row]), 0.0 if tare else free.false_mass.get(load.joint, 0.0)
-        apparent = MassEstimate(run.mass, float(np.hypot(run.std, false)))
+        joint = robot.joint(load.joint)
+        same = [other for ls in logs.values() for other in ls if other.joint == load.joint and not tare]
+        parts = [tare[i] if tare else load, *filter(None, map(unseen_part, same))]
+        run, *free = (fit_mass(rows_of([part], {}, "load")) for part in parts)
+        apparent = MassEstimate(run.mass, pooled_std(run, free))
         if not load.is_current or not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
             continue
         assert weighing.weight.mass
@@ -238,8 +241,8 @@ def torque_constants(
 def proposal(name: str, mass: float, constant: Constant, stated: float, joint: Joint) -> str:
     """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
     text = (
-        f"{name}: the known mass of {mass:g} kg gives torque_constant = {constant.value:.3g} ± {constant.std:.2g} N m/A "
-        f"with gear_ratio = {joint.gear_ratio:g}"
+        f"{name}: the known mass of {mass:g} kg gives torque_constant = {constant.value:.3g} ± {constant.std:.2g} "
+        f"N m/A with gear_ratio = {joint.gear_ratio:g}"
     )
     if constant.value < 0:
         return f"{text}; it is negative, so check the sign of the current and the position of the mass"

@@ -25,6 +25,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
 # If a smaller share of a column's power is variance, an offset more than doubles the standard error.
@@ -91,6 +92,19 @@ def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
         numerator += float(x @ y) / row.sigma**2
         denominator += float(x @ x) / row.sigma**2
     return numerator / denominator if denominator > 0 else float("nan")
+
+
+def pooled_std(run: MassEstimate, free: Sequence[MassEstimate]) -> float:
+    """Standard error of the mass of one joint, of which 1.96 make a 95 % interval.
+
+    The variances of the run and of masses in free motion are averaged, and widened by Student's t: a jackknife over
+    `PARTS` has few degrees of freedom.  If masses in free motion, truly 0, exceed it beyond chance, they widen it, too.
+    """
+    std = float(np.sqrt(np.mean([estimate.std**2 for estimate in (run, *free)])))
+    squares = float(np.sum([(estimate.mass / std) ** 2 for estimate in free])) if std > 0 else 0.0
+    exceeds = bool(free) and chdtrc(len(free), squares) < MIN_AGREEMENT
+    birge = max(1.0, (squares / len(free)) ** 0.5) if exceeds else 1.0
+    return birge * std * students_95((PARTS - 1) * (1 + len(free))) / NORMAL_95
 
 
 def scaled_constant(constant: float, known_mass: float, apparent: MassEstimate) -> Constant:

@@ -134,6 +134,13 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "the mass: efforts per kilogram times external efforts, over their squares, weighted by the model "
                  "error", "weighing"),
     )),
+    (records.TorqueConstant, (
+        Prose("**Torque constant.** The mass that a joint alone shows with its constant gives another constant, with "
+              "which it shows the known mass. Its standard error averages the jackknife variances of the run and of "
+              "free motion, widened by Student's t."),
+        Equation('hat(K)_m = K_m m_L \\/ hat(m)_L',
+                 "the torque constant: the one in use times the known mass over the apparent one", "torque-constant"),
+    )),
     (records.TissueModel, (
         Prose("**Tissue.** Stiffness is the median slope of straight lines through the contacts of the pushes. Of four "
               "laws ($B = 0$ or not; $nu = 1$, then with damping $B dot(d)$, or not), the simplest is taken that "

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from davinci_forces.records import FreeWeight, Load, Weight
+from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.report.content import (
     Block,
     Cell,
@@ -26,12 +26,13 @@ SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
 def section(context: Context) -> Section | None:
     """The masses of all weight logs in a table, then each log in detail."""
-    weights = context.catalogue.records(Weight)
-    if not weights:
+    weights, constants = context.catalogue.records(Weight), context.catalogue.records(TorqueConstant)
+    if not weights and not constants:
         return None
-    content: list[Block] = [intro(), summary(context, weights)]
+    content: list[Block] = [intro(), *([summary(context, weights)] if weights else [])]
     content += (verdict(context, weight) for weight in weights)
-    content += log_blocks(context, weights[0])
+    content += [torque_constants(context, constants)] if constants else []
+    content += log_blocks(context, weights[0]) if weights else ()
     if weights[1:]:
         others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
         content.append(OnScreen("The other runs with a mass", "other-masses", others))
@@ -72,6 +73,29 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         rows,
         "weight-table",
         "llrrrrl",
+    )
+
+
+def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
+    """The torque constants that known masses give, beside those that are used."""
+    rows = tuple(
+        (
+            literal(of.log),
+            title(of.joint),
+            str(Number(of.stated_mass, "kg")),
+            "–" if math.isnan(of.torque_constant_used) else str(Number(of.torque_constant_used, "N m/A")),
+            context.number(f"weight.{of.log}.{of.joint}.torque_constant", 3),
+        )
+        for of in constants
+    )
+    return Table(
+        "Torque constants with which the measured currents carry the known mass, each from one joint alone. They are "
+        "proposals that nothing applies: `torque_constant` in study.toml does. They assume the stated mass, its "
+        "position and the gear ratio. Joints whose current shows the mass too imprecisely are left out.",
+        ("Log", "Joint", "Known mass", "Used", "Proposed"),
+        rows,
+        "torque-constants",
+        "llrrr",
     )
 
 
