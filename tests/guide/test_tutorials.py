@@ -1,0 +1,83 @@
+"""A reader who does what a tutorial says, word for word, sees what it shows."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+from tests.guide.make_logs import LOGS
+
+GUIDE = ROOT / "pipeline" / "davinci_forces" / "guide"
+PAGES = {page.stem: page for page in sorted((GUIDE / "tutorials").glob("*.md"))}
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
+BIN = str(Path(sys.executable).parent)
+ENVIRONMENT = {
+    **os.environ,
+    "PATH": os.pathsep.join([BIN, os.environ["PATH"]]),
+    "PYTHONPATH": str(ROOT / "pipeline"),
+    "COLUMNS": "200",
+    "TERM": "dumb",
+}
+
+
+def pattern(line: str) -> str:
+    """A line of a tutorial as an expression: `...` is any text, and blanks between columns are of any width."""
+    words = [".*".join(re.escape(part) for part in word.split("...")) for word in line.split()]
+    return r"^\s*" + r"\s+".join(words) + r"\s*$"
+
+
+def console(text: str, folder: Path) -> None:
+    """Run the commands of a block; every line below one is in its output."""
+    output = None
+    for line in filter(str.strip, text.splitlines()):
+        if line.startswith("$ "):
+            done = subprocess.run(
+                line[2:], shell=True, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False
+            )
+            output = done.stdout + done.stderr
+            assert done.returncode == 0, f"{line}\n{output}"
+        elif line.strip() != "...":
+            assert output is not None, f"{line!r} comes before any command"
+            assert re.search(pattern(line), output, re.M), f"{line!r} is not in\n{output}"
+
+
+def follow(page: Path, folder: Path) -> None:
+    for kind, text in BLOCK.findall(page.read_text()):
+        if kind == "console":
+            console(text, folder)
+        elif kind == "toml":
+            file = re.match(r"# (\S+)\n", text)
+            assert file, f"a block of TOML names no file: {text[:40]!r}"
+            (folder / file[1]).write_text(text)
+        else:
+            assert kind == "python", kind
+            run = subprocess.run(
+                [sys.executable, "-c", text], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False
+            )
+            assert run.returncode == 0, f"{text}\n{run.stderr}"
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_tutorial_says_is_what_a_reader_sees(page, tmp_path):
+    LOGS[page](tmp_path)
+    follow(PAGES[page], tmp_path)
+
+
+def test_every_tutorial_has_logs_and_every_log_a_tutorial():
+    assert PAGES.keys() == LOGS.keys()
+    for name, page in PAGES.items():
+        title, _, sentence, *_ = page.read_text().splitlines()
+        assert title.startswith("# "), name
+        assert sentence, name
+
+
+@pytest.mark.parametrize("line", ["roll  ● Good ... N m", "R2"])
+def test_a_line_that_the_output_lacks_is_an_error(line, tmp_path):
+    with pytest.raises(AssertionError, match="is not in"):
+        console(f"$ echo 'roll ● Fair 0.3 N m, R2'\n{line}\n", tmp_path)
+    console("$ echo 'roll   ● Good  0.3 N m'\nroll ● Good ... N m\n", tmp_path)
