@@ -28,7 +28,8 @@ URDF = "".join(
         JOINT.format(name="pan", on="base", link="shoulder", at="0 0 0.1", axis="0 0 1", effort=150),
         JOINT.format(name="lift", on="shoulder", link="upper", at="0 0 0.1", axis="0 1 0", effort=150),
         JOINT.format(name="elbow", on="upper", link="fore", at="0.4 0 0", axis="0 1 0", effort=80),
-        "</robot>\n",
+        '<link name="tool"/><joint name="flange" type="fixed"><parent link="fore"/><child link="tool"/>'
+        '<origin xyz="0.35 0 0"/></joint>\n</robot>\n',
     ]
 )
 
@@ -53,6 +54,12 @@ def measured(ideal: np.ndarray, dq: np.ndarray, seed: int, scale: np.ndarray) ->
     """Efforts with viscous and Coulomb friction and noise, in proportion to a scale of each joint."""
     noise = np.random.default_rng(seed).normal(size=dq.shape)
     return ideal + scale * (0.8 * dq + 0.6 * np.tanh(dq / 0.01) + 0.05 * noise)
+
+
+def sensed(*signals: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Positions and velocities with the noise of an encoder."""
+    rng = np.random.default_rng(7)
+    return tuple(x + s * rng.normal(size=x.shape) for x, s in zip(signals, (1e-5, 2e-3), strict=True))
 
 
 def push(t: np.ndarray, start: float, peak: float) -> np.ndarray:
@@ -96,25 +103,23 @@ def urdf_arm(home: Path) -> None:
         q = q + [0.0, -0.5, 1.0]
         tau = measured(robot.inverse_dynamics(q, dq, ddq), dq, seed, np.array([2.0, 2.0, 1.0]))
         tau[:, 2] += push(t, 10.0, 4.0) * (name == "contact")
-        table(folder / f"{name}.csv", t, q, dq, tau, header=header)
+        table(folder / f"{name}.csv", t, *sensed(q, dq), tau, header=header)
 
 
 def bags(home: Path) -> None:
     """The first three joints of a research kit's arm as CRTK publishes them, with a push on the slide in the last."""
     folder = home / "raw" / "psm"
     folder.mkdir(parents=True)
-    robot = davinci_forces.robot("dvrk_psm")
     joints = ["outer_yaw", "outer_pitch", "outer_insertion"]
+    size = np.array([1.0, 1.0, 0.15])
     for name, (seed, duration, period) in ROLES.items():
-        t, *states = motion(seed, 3, duration, period, 0.3)
-        still = np.zeros((len(t), len(robot.joints) - 3))
-        q, dq, ddq = (np.hstack([state * [1, 1, 0.1], still]) for state in states)
-        q[:, 2] += 0.12
-        ideal = robot.inverse_dynamics(q, dq, ddq)[:, :3]
-        q, dq = q[:, :3], dq[:, :3]
-        tau = measured(ideal, dq, seed, np.array([0.5, 0.5, 2.0]))
+        t, q, dq, ddq = motion(seed, 3, duration, period, 0.3)
+        q, dq, ddq = q * size + [0, 0, 0.12], dq * size, ddq * size
+        gravity = np.column_stack([3.0 * np.sin(q[:, 0]), 2.0 * np.sin(q[:, 1]) + np.cos(q[:, 1]), np.full(len(t), -1.5)])
+        tau = measured(gravity + [0.5, 0.5, 1.5] * ddq, dq, seed, np.array([0.5, 0.5, 2.0]))
         tau[:, 2] += push(t, 10.0, 6.0) * (name == "contact")
-        write(folder / f"{name}.bag", (joint_state(s, joints, *state) for s, *state in zip(t, q, dq, tau, strict=True)))
+        states = zip(t, *sensed(q, dq), tau, strict=True)
+        write(folder / f"{name}.bag", (joint_state(s, joints, *state) for s, *state in states))
 
 
 LOGS: dict[str, Callable[[Path], None]] = {
