@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.mechanics.kinematics import tip
+from davinci_forces import robots
 from davinci_forces.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from davinci_forces.robots import davinci, dvrk_psm, from_toml
 from davinci_forces.robots.davinci_chain import DRIVES
@@ -143,6 +144,20 @@ def test_a_chain_that_no_table_describes_has_links_without_parameters():
     assert np.isnan(links.alpha).all()
     assert links.mass[0] == 0.0
     assert links.mass[1] == 0.5
+
+
+def test_an_arm_that_is_singular_somewhere_or_everywhere_has_a_workspace(tmp_path):
+    """Two parallel axes never push the tip along them, so the condition of their Jacobian is infinite."""
+    link = '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    joint = (
+        '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="0.4 0 0"/>'
+        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+    )
+    parts = [*(link.format(name) for name in "abc"), joint.format("p", "a", "b"), joint.format("q", "b", "c")]
+    (tmp_path / "planar.urdf").write_text(f'<robot name="planar">{"".join(parts)}</robot>')
+    [workspace] = of(design.run(robots.load("planar.urdf", tmp_path)), Workspace)
+    assert len(workspace.condition)
+    assert workspace.condition.min() > 1e6
 
 
 # What public recordings of such arms reach: rad, rad, m.

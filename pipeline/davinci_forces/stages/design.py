@@ -40,7 +40,8 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
     condition, names = np.array([]), np.array(chain.names, object)
     if limited:
         grid = np.array(list(product(*(np.linspace(low, high, GRID_POINTS) for low, high in limits.tolist()))))
-        condition = tip_force.condition(jacobian(chain, grid)[0])
+        # Where the Jacobian is singular, the largest number stands for infinity, which no record holds.
+        condition = np.minimum(tip_force.condition(jacobian(chain, grid)[0]), np.finfo(float).max)
     yield links(robot, chain, float(condition.max()) if limited else float("nan"))
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
     for name, q in poses.items():

@@ -1,0 +1,38 @@
+"""The guide's notebook runs from its first cell to its last where the demonstration is, and is small."""
+
+import os
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from tests.conftest import ROOT
+from tests.guide.make_logs import demonstration
+
+NOTEBOOK = ROOT / "pipeline" / "davinci_forces" / "guide" / "study.ipynb"
+LARGEST = 300_000  # [bytes]
+
+
+def shown(notebook: nbformat.NotebookNode) -> list[str]:
+    """What the cells print or return as text; a picture is only that it is one."""
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    return ["a picture" if "image/png" in o.get("data", {}) else o.get("text") or o.data["text/plain"] for o in outputs]
+
+
+@pytest.mark.medium
+@pytest.mark.filterwarnings("ignore")  # of the kernel's own packages
+def test_the_notebook_shows_what_it_shows_again(tmp_path, monkeypatch):
+    demonstration(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "pipeline"))
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # the kernel's, which puts pictures into cells
+    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    assert NOTEBOOK.stat().st_size < LARGEST
+    stored = nbformat.read(NOTEBOOK, as_version=4)
+    again = nbformat.from_dict(stored)
+    before = shown(stored)
+    client = NotebookClient(again, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}})
+    client.execute()
+    assert before.count("a picture") == 1
+    assert shown(again) == before
