@@ -77,7 +77,7 @@ def copies(folder: str, **files: str) -> Callable[[Path], None]:
 
 
 def demonstration(home: Path) -> None:
-    """The slide's part of the demonstration, under its name and with its own study.toml: seconds, not a minute."""
+    """The roll's two logs of the demonstration, under its name and with its study.toml: seconds, not a minute."""
     folder = home / "raw" / "davinci-demo"
     folder.mkdir(parents=True)
     head, *logs = (DEMO / "study.toml").read_text().split("[[log]]\n")
@@ -100,7 +100,7 @@ def urdf_arm(home: Path) -> None:
     header = ",".join(["timestamp", *(name.format(k) for name in names for k in range(3))])
     for name, (seed, duration, period) in ROLES.items():
         t, q, dq, ddq = motion(seed, 3, duration, period, 0.4)
-        q = q + [0.0, -0.5, 1.0]
+        q += np.array([0.0, -0.5, 1.0])
         tau = measured(robot.inverse_dynamics(q, dq, ddq), dq, seed, np.array([2.0, 2.0, 1.0]))
         tau[:, 2] += push(t, 10.0, 4.0) * (name == "contact")
         table(folder / f"{name}.csv", t, *sensed(q, dq), tau, header=header)
@@ -115,7 +115,9 @@ def bags(home: Path) -> None:
     for name, (seed, duration, period) in ROLES.items():
         t, q, dq, ddq = motion(seed, 3, duration, period, 0.3)
         q, dq, ddq = q * size + [0, 0, 0.12], dq * size, ddq * size
-        gravity = np.column_stack([3.0 * np.sin(q[:, 0]), 2.0 * np.sin(q[:, 1]) + np.cos(q[:, 1]), np.full(len(t), -1.5)])
+        gravity = np.column_stack(
+            [3.0 * np.sin(q[:, 0]), 2.0 * np.sin(q[:, 1]) + np.cos(q[:, 1]), np.full(len(t), -1.5)]
+        )
         tau = measured(gravity + [0.5, 0.5, 1.5] * ddq, dq, seed, np.array([0.5, 0.5, 2.0]))
         tau[:, 2] += push(t, 10.0, 6.0) * (name == "contact")
         states = zip(t, *sensed(q, dq), tau, strict=True)
