@@ -68,7 +68,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
 
 def tests(context: Context, averages: list[Average]) -> Table:
     """Whether the noise is white and normal, signal by signal."""
-    header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Kurtosis")
+    header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Excess kurtosis")
     rows = tuple(
         (literal(a.log), title(a.joint), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
         for a in averages

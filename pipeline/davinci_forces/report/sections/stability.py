@@ -72,6 +72,13 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
         return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
     headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
     half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
+    if np.isnan(half):
+        side = "above" if limit.k_t_limit > stiffest.stiffness else "below"
+        return Verdict(
+            "info",
+            f"Hand “{name}”: the limit, {headline}, is {side} the measured tissue, {tissue}. The filter's lag is "
+            "assumed, not measured in logs, so stability is not rated.",
+        )
     stable = limit.k_t_limit - half > stiffest.stiffness and limit.delay_margin != 0.0  # NaN if no delay is too much
     words = f"{'**stable** against' if stable else 'may oscillate against'} the measured tissue, {tissue}"
     if limit.k_t_limit + half < stiffest.stiffness:

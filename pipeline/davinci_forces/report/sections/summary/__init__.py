@@ -199,7 +199,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     )  # fmt: skip
     return Table(
         "Trust in the estimates. New path: share not fitted. Model error: RMS of measured minus modelled effort, "
-        "without noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
+        "without noise. Error/effort: its share of the measured effort's RMS; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
         "lower. Coverage: their share in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
@@ -215,7 +215,8 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     if p is None:
         row += ["–"] * 4
     else:
-        r2, ceiling = context.numbers(p.prefix, ("r2", "r2_ceiling"), 2)
+        r2 = context.number(f"{p.prefix}.r2", 2)
+        ceiling = context.number(f"{p.prefix}.r2_ceiling", 2, std=None)
         row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
     key = space.prefix if space is not None else ""
     row.append(context.number(f"{key}.detection_level", 2))
@@ -291,7 +292,7 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
-        narrow = f"the 95 % band covers only {percent(space.coverage)} of free-space samples."
+        narrow = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
 
 

@@ -21,6 +21,7 @@ USES = {  # what the logs of each role are for
     "tissue": "of pushes on tissue",
 }
 MAX_MEASURED = 3  # masses and stiffnesses on page one
+MIN_QUARTILES = 4  # pushes, below which quartiles are interpolated rather than observed
 MAX_NAMED = 3  # joints that a clause of the verdict names
 TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject"
 
@@ -86,7 +87,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
     for log in context.catalogue.records(Stiffness):
         level = stiffness_level(log, context.true_stiffness(log.log))
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
-        quartiles = f", quartiles {low} and {high}" if log.pushes > 1 else ""
+        quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
         used = f" ({log.pushes} of {len(log)} pushes)"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
