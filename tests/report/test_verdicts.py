@@ -9,6 +9,7 @@ from report_records import free_space, prediction, stiffness, weight
 from davinci_forces.maths.periods.shift import SAME_PATH
 from davinci_forces.records import PathShare
 from davinci_forces.report import verdicts
+from davinci_forces.report.sections.summary.opening import verdict_sentence
 from davinci_forces.report.verdicts import (
     Trust,
     band,
@@ -195,3 +196,9 @@ def test_the_table_of_thresholds_says_what_the_verdicts_do():
     said = " ".join(str(cell) for row in thresholds() for cell in row)
     for threshold in ("10 %", "25 %", "33 %", "100 %", "90 % to 98 %"):
         assert threshold in said
+
+
+def test_bands_are_not_called_right_where_none_was_judged():
+    unjudged = replace(trust(error=0.5), space=None)
+    assert "bands are right" not in verdict_sentence(None, [unjudged])
+    assert "bands are right" in verdict_sentence(None, [replace(unjudged, space=free_space(coverage=0.95))])

@@ -72,7 +72,7 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
         return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
     headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
     half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
-    if np.isnan(half):
+    if np.isnan(limit.filter_lag_std):
         side = "above" if limit.k_t_limit > stiffest.stiffness else "below"
         return Verdict(
             "info",

@@ -38,8 +38,9 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     parts += errors([trusted for trusted in trusts if trusted not in fine])
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
     which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
-    parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["the 95 % bands are right or too wide"]
-    text = "; ".join(parts)
+    if any(trusted.space is not None for trusted in trusts):
+        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["the 95 % bands are right or too wide"]
+    text = "; ".join(parts) or "no effort was estimated in free space"
     return f"{text[:1].upper()}{text[1:]}."
 
 
