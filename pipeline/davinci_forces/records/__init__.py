@@ -85,7 +85,8 @@ KINDS: dict[str, type[Record]] = {
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
         FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse, HapticRun,
+        TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse,
+        HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

@@ -199,8 +199,9 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     )  # fmt: skip
     return Table(
         "Trust in the estimates. New path: share not fitted. Model error: RMS of measured minus modelled effort, "
-        "without noise. Error/effort: its share of the measured effort's RMS; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
-        "lower. Coverage: their share in the 95 % band.",
+        "without noise. Error/effort: its share of the measured effort's RMS; $R^2$ includes the noise. Ceiling: "
+        "largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: "
+        "their share in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
