@@ -36,7 +36,7 @@ STOP_SIGNALS = signal.SIGINT, signal.SIGTERM
 STOP_TIMEOUT = 3.0  # [s] from a stop signal to the forced end of the process
 STAGE = "stage"  # name of the command that is copied for every stage and group
 FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # panels of the help before and after those of the groups
-FIRST_COMMANDS = ("all", "new", "inspect", "compare", REPORT)
+FIRST_COMMANDS = ("all", "new", "inspect", "compare", REPORT, "guide")
 
 
 class CommandLine(TyperGroup):

@@ -2,4 +2,5 @@
 
 COMMANDS = (
     "new", "inspect", "verify", "simulate", "robot", "excite", "stability", "haptics", "compare", "campaign", "export",
+    "guide",
 )  # fmt: skip

@@ -80,3 +80,11 @@ def echo(text: str, err: bool = False, **style: Any) -> None:
     with suppress(LookupError):
         text = text.encode(encoding, "replace").decode(encoding)
     typer.secho(text, err=err, **style)
+
+
+def show_markdown(text: str) -> None:
+    """Print Markdown, laid out for the width of the terminal; a pipe gets the same without colours."""
+    from rich.console import Console as Terminal
+    from rich.markdown import Markdown
+
+    Terminal().print(Markdown(visible(text, "\n\t")))

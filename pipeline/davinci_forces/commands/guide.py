@@ -1,0 +1,33 @@
+"""Show the guide: the list of topics, one topic, or with `--html` all pages as one file for a browser."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from davinci_forces.runner.console import echo, show_markdown
+
+DEFAULT_FILE = Path("davinci-forces-guide.html")
+
+
+def run(
+    topic: Annotated[str | None, typer.Argument(help="Topic to show; without one, the list of topics.")] = None,
+    html: Annotated[bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")] = False,
+    out: Annotated[Path | None, typer.Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
+) -> None:
+    """Show a topic or the list of topics in the terminal, or write the HTML file and say where it is."""
+    from davinci_forces import guide
+    from davinci_forces.errors import BadRequest
+    from davinci_forces.files import write_bytes
+
+    page = guide.page(topic) if topic else None
+    if not html:
+        if out:
+            raise BadRequest("--out names the file that --html writes; add --html")
+        show_markdown(page.as_text if page else guide.contents())
+        return
+    from davinci_forces.guide.html import render
+
+    file = out or DEFAULT_FILE
+    write_bytes(file, render().encode())
+    echo(f"see {file}{f'#{topic}' if topic else ''}")

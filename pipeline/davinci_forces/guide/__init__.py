@@ -1,0 +1,81 @@
+"""The guide: pages of Markdown in folders by purpose, for the terminal and as one HTML file that needs no network."""
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+
+from davinci_forces.errors import BadRequest
+
+FOLDER = Path(__file__).parent
+GROUPS = {  # folder -> its heading, in the order of the list
+    "tutorials": "Tutorials: learn by doing",
+    "how-to": "How to: one task each",
+    "reference": "Reference: every name, from the code",
+    "explanation": "Explanation: how and why",
+    "": "The project",
+    "changes": "Changes, by version",
+}
+INDEX = "index"  # topic of the page that lists the others
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.md(?:#([\w-]+))?\)")  # to a page, perhaps to a heading
+COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of the guide; its topic is the stem of its file."""
+
+    topic: str
+    folder: str
+    title: str
+    summary: str  # one sentence
+    text: str  # Markdown, with title and summary
+
+    @property
+    def as_text(self) -> str:
+        """The Markdown for a terminal: links to pages become their topics."""
+        return LINK.sub(lambda link: f"{link[1]} (topic `{link[2]}`)", self.text)
+
+
+@cache
+def pages() -> tuple[Page, ...]:
+    """All pages, by group; in a group in the order in which the index links them."""
+    found = [_read(file) for file in FOLDER.rglob("*.md")]
+    index = next(page for page in found if page.topic == INDEX)
+    order = [INDEX, *(link[2] for link in LINK.finditer(index.text))]
+    place = {topic: i for i, topic in reversed(list(enumerate(order)))}
+    groups = list(GROUPS)
+    return tuple(sorted(found, key=lambda p: (groups.index(p.folder), place.get(p.topic, len(order)), p.topic)))
+
+
+def page(topic: str) -> Page:
+    """The page of a topic.
+
+    Raises
+    ------
+    BadRequest
+        If there is no such topic; the message names those that are spelled most alike.
+    """
+    by_topic = {page.topic: page for page in pages()}
+    if topic not in by_topic:
+        close = get_close_matches(topic.lower(), by_topic, 3, 0.4) or [t for t in by_topic if topic.lower() in t]
+        meant = f"did you mean {' or '.join(close)}? " if close else ""
+        raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
+    return by_topic[topic]
+
+
+def contents() -> str:
+    """The list of topics as Markdown, by group, each with its summary."""
+    lines = ["# davinci-forces: the guide", "", "`davinci-forces guide TOPIC` shows a page."]
+    for folder, heading in GROUPS.items():
+        listed = [page for page in pages() if page.folder == folder]
+        lines += ["", f"## {heading}", "", *(f"- **{page.topic}**: {page.summary}" for page in listed)] if listed else []
+    return "\n".join(lines)
+
+
+def _read(file: Path) -> Page:
+    text = COMMENT.sub("", file.read_text(encoding="utf-8"))
+    title, summary = (" ".join(part.split()) for part in text.split("\n\n", 2)[:2])
+    folder = file.parent.relative_to(FOLDER).as_posix().removeprefix(".")
+    return Page(file.stem, folder, title.removeprefix("# "), summary, text)
