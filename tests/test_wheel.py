@@ -57,15 +57,15 @@ def installed(wheel, tmp_path_factory) -> Path:
 @pytest.mark.medium
 def test_the_wheel_holds_every_file_of_the_package(wheel):
     home = ROOT / "pipeline"
-    files = (file for file in home.rglob("*") if file.is_file() and "__pycache__" not in file.parts)
-    wanted = {file.relative_to(home).as_posix() for file in files if file.suffix != ".md"}
+    files = (file for file in (home / "davinci_forces").rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    wanted = {file.relative_to(home).as_posix() for file in files}
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert held == wanted
     assert {"davinci_forces/py.typed", "davinci_forces/simulation/shipped/davinci-joints.toml"} <= held
     suffixes = {Path(name).suffix for name in held}
     assert suffixes == {
-        ".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".bib", ".typed", ".json", ".c", ".h",
+        ".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".bib", ".typed", ".json", ".c", ".h", ".md",
     }  # fmt: skip
 
 
