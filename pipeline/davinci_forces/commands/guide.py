@@ -1,4 +1,4 @@
-"""Show the guide: the list of topics, one topic, or with `--html` all pages as one file for a browser."""
+"""Show the guide: the list of topics, one topic, or all pages as one HTML file for a browser (--html)."""
 
 from pathlib import Path
 from typing import Annotated
