@@ -57,7 +57,9 @@ def installed(wheel, tmp_path_factory) -> Path:
 @pytest.mark.medium
 def test_the_wheel_holds_every_file_of_the_package(wheel):
     home = ROOT / "pipeline"
-    files = (file for file in (home / "davinci_forces").rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    files = (
+        file for file in (home / "davinci_forces").rglob("*") if file.is_file() and "__pycache__" not in file.parts
+    )
     wanted = {file.relative_to(home).as_posix() for file in files}
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}

@@ -12,7 +12,9 @@ DEFAULT_FILE = Path("davinci-forces-guide.html")
 
 def run(
     topic: Annotated[str | None, typer.Argument(help="Topic to show; without one, the list of topics.")] = None,
-    html: Annotated[bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")] = False,
+    html: Annotated[
+        bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
 ) -> None:
     """Show a topic or the list of topics in the terminal, or write the HTML file and say where it is."""

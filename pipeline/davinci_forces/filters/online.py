@@ -43,7 +43,7 @@ Z_OF_MOTION: dict[str, Callable[[float, float], float]] = {
 
 
 @dataclass(frozen=True)
-class ExternalEffort:
+class OnlineEffort:
     """The external efforts on the joints (m,) at time t [s], which is `delay` before the newest sample.
 
     While the first window fills, and where the status of a joint is "bad input", numbers are NaN.  `contact` is 1 above
@@ -344,7 +344,7 @@ class Stream:
         for joint in self.filters:
             joint.restart()
 
-    def step(self, t: float, q: ArrayLike, tau: ArrayLike, dq: ArrayLike | None = None) -> ExternalEffort:
+    def step(self, t: float, q: ArrayLike, tau: ArrayLike, dq: ArrayLike | None = None) -> OnlineEffort:
         """Take a sample at t [s]: positions, efforts and, if the arm measures them, velocities over `coordinates`.
 
         A sample that is not finite, or not later than the one before, leaves everything as it was.  After a gap of
@@ -364,13 +364,13 @@ class Stream:
             return self._unknown(t, STARTING)
         return self._estimate(t - self.delay)
 
-    def _unknown(self, t: float, status: str) -> ExternalEffort:
+    def _unknown(self, t: float, status: str) -> OnlineEffort:
         m = len(self.joints)
         q, dq, tau_hat, tau_ext, std = (np.full(m, np.nan) for _ in range(5))
         none = np.full(m, -1, np.int64)
-        return ExternalEffort(t - self.delay, (status,) * m, q, dq, tau_hat, tau_ext, std, none, np.full(3, np.nan))
+        return OnlineEffort(t - self.delay, (status,) * m, q, dq, tau_hat, tau_ext, std, none, np.full(3, np.nan))
 
-    def _estimate(self, t: float) -> ExternalEffort:
+    def _estimate(self, t: float) -> OnlineEffort:
         columns = [np.array(column) for column in zip(*self._samples, strict=True)]
         q_all, tau_all, logged = columns[0], columns[1], columns[2] if len(columns) > 2 else None
         tau, rows, status = tau_all[-1 - round(self.delay * self.rate)], [], []
@@ -397,7 +397,7 @@ class Stream:
         values, contact = np.array([row[:5] for row in rows]).T, np.array([row[5] for row in rows], np.int64)
         force = self._force(values[0], values[3])
         q, dq, tau_hat, tau_ext, std = values
-        return ExternalEffort(t, tuple(status), q, dq, tau_hat, tau_ext, std, contact, force)
+        return OnlineEffort(t, tuple(status), q, dq, tau_hat, tau_ext, std, contact, force)
 
     def _links_effort(self, joint: OnlineJoint, q: Array, dq: Array, ddq: Array) -> tuple[float, float]:
         """The effort of the links on a joint, and its inertia there; 0 of a joint by itself."""

@@ -70,7 +70,9 @@ def contents() -> str:
     lines = ["# davinci-forces: the guide", "", "`davinci-forces guide TOPIC` shows a page."]
     for folder, heading in GROUPS.items():
         listed = [page for page in pages() if page.folder == folder]
-        lines += ["", f"## {heading}", "", *(f"- **{page.topic}**: {page.summary}" for page in listed)] if listed else []
+        lines += (
+            ["", f"## {heading}", "", *(f"- **{page.topic}**: {page.summary}" for page in listed)] if listed else []
+        )
     return "\n".join(lines)
 
 
