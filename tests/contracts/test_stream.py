@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.exports import renderer
 from davinci_forces.exports.identified import export_of
 from davinci_forces.filters import ekf, online
-from davinci_forces.filters.online import BAD_INPUT, STARTING, Links, OnlineJoint, Stream, Window, delay_of
+from davinci_forces.filters.online import BAD_INPUT, STARTING, LinkTree, OnlineJoint, Stream, Window, delay_of
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.used import Identified
@@ -29,7 +29,7 @@ T_S = 0.01
 def test_effort_and_inertia_are_those_of_the_model_with_every_term(structure):
     exported, moved = export(DAVINCI, structure), motion(3)
     document = exported.document()
-    links = Links(document["chain"], document["gravity"])
+    links = LinkTree(document["chain"], document["gravity"])
     for number, joint in enumerate(exported.joints):
         of_model = motion_of(joint, moved)
         row = joint.model.efforts.index(joint.name)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from davinci_forces.filters import stepping
 from davinci_forces.maths.models import terms
 from davinci_forces.maths.models.bias import bias as bias_of
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
@@ -25,7 +26,7 @@ DQ = random.uniform(0.05, 1.2, 200) * random.choice([-1.0, 1.0], 200)  # away fr
 def bias(term, q, dq) -> np.ndarray:
     """b, b_q and b_dq (3, N), as the filter's loop has them."""
     c = bias_coefficients((term,), np.ones(1))
-    return np.array([sample.bias(c, *x, 0.0) for x in zip(q.tolist(), dq.tolist(), strict=True)]).T
+    return np.array([stepping.bias(c, *x, 0.0) for x in zip(q.tolist(), dq.tolist(), strict=True)]).T
 
 
 def test_every_term_is_listed_under_its_name():
@@ -61,8 +62,8 @@ def test_all_terms_together_are_one_model_in_the_regressor_and_in_the_loop():
     c = bias_coefficients(model, theta)
     for q, dq in [(0.3, -0.2), (-0.4, 0.7), (0.1, 0.0)]:
         [phi] = regressor(model, np.array([q]), np.array([dq]), np.zeros(1))
-        assert sample.bias(c, q, dq, 0.0)[0] == pytest.approx(phi @ theta, rel=1e-14)
-        assert_allclose(sample.bias(c, q, dq, 0.0), bias_of(c, q, dq, 0.0), rtol=1e-14)
+        assert stepping.bias(c, q, dq, 0.0)[0] == pytest.approx(phi @ theta, rel=1e-14)
+        assert_allclose(stepping.bias(c, q, dq, 0.0), bias_of(c, q, dq, 0.0), rtol=1e-14)
 
 
 @TERM

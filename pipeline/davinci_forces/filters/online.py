@@ -71,7 +71,7 @@ class TermValue(NamedTuple):
     scale: float
 
 
-class Links:
+class LinkTree:
     """The links of an arm, of which each set of inertial parameters gives efforts.  Featherstone 2008, chapter 5."""
 
     def __init__(self, chain: Mapping[str, Any], gravity: float) -> None:
@@ -221,7 +221,7 @@ class OnlineJoint:
     """The filter of one joint of a model, with its belief and the states of its friction."""
 
     def __init__(
-        self, joint: Mapping[str, Any], model: Mapping[str, Any], coordinates: Sequence[str], links: Links
+        self, joint: Mapping[str, Any], model: Mapping[str, Any], coordinates: Sequence[str], links: LinkTree
     ) -> None:
         parameters, tuned = model["parameters"], joint["filter"]
         self.name, self.row = joint["name"], list(coordinates).index(joint["name"])
@@ -327,7 +327,7 @@ class Stream:
         names = [j["name"] for j in joints]
         coupled = any(models[j["model"]]["structure"] == "coupled" for j in joints)
         self.coordinates, self.joints = tuple(every if coupled else names), tuple(names)
-        self.links = Links(chain, model["gravity"])
+        self.links = LinkTree(chain, model["gravity"])
         self.filters = [OnlineJoint(j, models[j["model"]], self.coordinates, self.links) for j in joints]
         self.rate, self.offset = float(joints[0]["filter"]["rate"]), np.zeros(len(names))
         self.has_tip = names == every and len(every) == 3 and self.links.tip is not None
