@@ -1,4 +1,4 @@
-"""The guide's notebook runs from its first cell to its last where the demonstration is, and is small."""
+"""The guide's notebooks run from their first cell to their last, and are small."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from nbclient import NotebookClient
 from tests.conftest import ROOT
 from tests.guide.make_logs import demonstration
 
-NOTEBOOK = ROOT / "pipeline" / "davinci_forces" / "guide" / "study.ipynb"
+NOTEBOOKS = sorted((ROOT / "pipeline" / "davinci_forces" / "guide").glob("*.ipynb"))
 LARGEST = 300_000  # [bytes]
 
 
@@ -27,13 +27,14 @@ def shown(notebook: nbformat.NotebookNode) -> list[str]:
 
 @pytest.mark.medium
 @pytest.mark.filterwarnings("ignore")  # of the kernel's own packages
-def test_the_notebook_shows_what_it_shows_again(tmp_path, monkeypatch):
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_shows_what_it_shows_again(notebook, tmp_path, monkeypatch):
     demonstration(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(ROOT / "pipeline"))
     monkeypatch.delenv("MPLBACKEND", raising=False)  # the kernel's, which puts pictures into cells
     monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-    assert NOTEBOOK.stat().st_size < LARGEST
-    stored = nbformat.read(NOTEBOOK, as_version=4)
+    assert notebook.stat().st_size < LARGEST
+    stored = nbformat.read(notebook, as_version=4)
     again = nbformat.from_dict(stored)
     before = shown(stored)
     client = NotebookClient(again, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}})
