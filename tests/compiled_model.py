@@ -25,20 +25,34 @@ OK, OUTSIDE, BAD = range(3)
 class CompiledModel:
     """The functions of an export in C; `restart` clears the state of a joint."""
 
-    def __init__(self, files: dict[str, str], folder: Path) -> None:
+    def __init__(self, files: dict[str, str], folder: Path, floats: bool = False) -> None:
         for name, text in files.items():
             (folder / name).write_text(text)
         compilers = [name for name in COMPILERS if shutil.which(name)]
         if not compilers:
             pytest.skip("no C compiler is installed, so that the exported C is not compiled")
+        if floats:  # in C only
+            compilers = [name for name in compilers if COMPILERS[name] == AS_C]
         for name in reversed(compilers):
-            command = [name, *COMPILERS[name], *FLAGS, "-shared", "-fPIC", "model.c", "-o", "model.so", "-lm"]
+            command = [
+                name,
+                *COMPILERS[name],
+                *FLAGS,
+                *["-DDF_FLOAT"] * floats,
+                "-shared",
+                "-fPIC",
+                "model.c",
+                "-o",
+                "model.so",
+                "-lm",
+            ]
             subprocess.run(command, cwd=folder, check=True)
         n = int(files["model.h"].partition("DF_COORDINATES = ")[2].partition(",")[0])
         z = int(files["model.h"].partition("DF_STATES = ")[2].partition(" ")[0])
-        self.library, number = ctypes.CDLL(str(folder / "model.so")), ctypes.c_double
-        self.State = structure(runs=ctypes.c_int, t=number, z=number * z, x=number * 9)
-        of_joint = dict.fromkeys(("t", "tau", "q_measured", "dq_measured"), number)
+        self.library, number = ctypes.CDLL(str(folder / "model.so")), ctypes.c_float if floats else ctypes.c_double
+        self.number = number
+        self.State = structure(runs=ctypes.c_int, t=ctypes.c_double, z=number * z, x=number * 9)
+        of_joint = {"t": ctypes.c_double} | dict.fromkeys(("tau", "q_measured", "dq_measured"), number)
         self.Sample = structure(**of_joint, **dict.fromkeys(("q", "dq", "ddq"), number * n))
         self.Result = structure(
             **dict.fromkeys(("tau_hat", "tau_ext", "std_filter", "std"), number), contact=ctypes.c_int
@@ -49,12 +63,12 @@ class CompiledModel:
         self.state, self.result = self.State(), self.Result()
 
     def step(self, joint: int, t, tau, q_measured, dq_measured, q, dq, ddq) -> int:
-        columns = [(ctypes.c_double * len(x))(*x) for x in (q, dq, ddq)]
+        columns = [(self.number * len(x))(*x) for x in (q, dq, ddq)]
         sample = self.Sample(t, tau, q_measured, dq_measured, *columns)
         return self.library.df_step(joint, *map(ctypes.byref, (self.state, sample, self.result)))
 
     def call(self, name: str, joint: int, *motion, state=False) -> tuple[int, float]:
-        columns, out = [(ctypes.c_double * len(x))(*x) for x in motion], ctypes.c_double(np.nan)
+        columns, out = [(self.number * len(x))(*x) for x in motion], self.number(np.nan)
         states = [ctypes.byref(self.state)] if state else []
         return getattr(self.library, f"df_{name}")(joint, *states, *columns, ctypes.byref(out)), out.value
 

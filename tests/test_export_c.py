@@ -60,6 +60,33 @@ def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
         assert contact.any()
 
 
+@pytest.mark.parametrize("structure", ["independent", "coupled"])
+def test_floats_give_four_digits_over_a_whole_log(structure, tmp_path):
+    given = export(DAVINCI, structure)
+    (tmp_path / "floats").mkdir()
+    exact = CompiledModel(renderer("c")(given), tmp_path)
+    floats = CompiledModel(renderer("c")(given), tmp_path / "floats", floats=True)
+    moved, random = motion(len(given.joints)), np.random.default_rng(1)
+    t = np.arange(len(moved.q)) / RATE + 0.5 * (moved.segment > 0)
+    for i, joint in enumerate(given.joints):
+        row = joint.model.efforts.index(joint.name)
+        tau = efforts(joint.model, joint.fit.theta, motion_of(joint, moved))[:, row] + (t > 2.0)
+        noise = random.normal(size=(2, len(t)))
+        results = []
+        for compiled in (exact, floats):
+            compiled.restart()
+            rows = []
+            for k in range(len(t)):
+                q, dq = moved.q[k, i] + 1e-4 * noise[0, k], moved.dq[k, i] + 1e-3 * noise[1, k]
+                assert compiled.step(i, t[k], tau[k], q, dq, moved.q[k], moved.dq[k], moved.ddq[k]) != BAD
+                r = compiled.result
+                rows.append((r.tau_hat, r.tau_ext, r.std))
+            results.append(np.array(rows))
+        size = np.abs(tau).max()
+        assert_allclose(results[1], results[0], rtol=0, atol=1e-4 * size)
+        assert not np.array_equal(*results)
+
+
 def test_inertia_bias_and_gravity_are_those_of_the_model(model):
     given, compiled = model
     moved = motion(len(given.joints), N=40)
