@@ -59,6 +59,7 @@ def problem(K=400, seed=0, rho=0.0, M=10) -> tuple[Regression, np.ndarray]:
     return Regression(Phi, tau, tau_var, np.full(K, M), (0,), ("a", "b", "c")), theta
 
 
+@pytest.mark.slow
 def test_parameters_are_found_as_well_as_they_claim_to_be():
     """Errors of many simulated recordings over stated deviations of noise have deviation one, for both estimators.
 

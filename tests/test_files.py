@@ -100,9 +100,9 @@ HANDED_IN = [
 ]
 
 
-@pytest.mark.medium
 @pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
 @pytest.mark.parametrize(("file", "words"), HANDED_IN, ids=[f"{words[0]} {Path(f).name}" for f, words in HANDED_IN])
+@pytest.mark.slow
 def test_what_is_handed_in_and_is_no_file_is_refused_by_its_name(server, file, words, kind):
     answer = server.ask(file, kind, *words)
     is_bounded(answer, (file, kind, words))

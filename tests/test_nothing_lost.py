@@ -153,7 +153,7 @@ def plant(study: Path, entry: Entry, file: Path | None = None) -> None:
     file.write_text(seal(entry))
 
 
-@pytest.mark.medium
+@pytest.mark.slow
 def test_no_entry_of_another_hand_reaches_a_file_outside(tmp_path):
     """200 entries of stages that are and were, in files or in the index, of one or several names."""
     study, rng = lab(tmp_path), np.random.default_rng(0)

@@ -566,6 +566,7 @@ def test_a_stuck_sensor_a_saturated_drive_and_a_wrong_unit_are_said():
     assert "check the unit of the position" in in_mrad
 
 
+@pytest.mark.slow
 def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
     """A log whose velocity is in other units than it says is remarked on, and the rest comes out as without it."""
     alone, beside = small(raw / "alone", ("one", "two")), small(raw / "beside", ("one", "two"))

@@ -205,6 +205,7 @@ def edit(file: Path, old: str, new: str) -> None:
     file.write_text(text.replace(old, new))
 
 
+@pytest.mark.slow
 def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, package):
     assert "fit: 5 of 5 up to date" in run_by(package, "fit", finished)
     edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
@@ -213,6 +214,7 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
     assert "the code of maths/models/terms.py changed" in said
 
 
+@pytest.mark.slow
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
     edit(
         package / "records" / "quantities" / "forces.py",
@@ -298,6 +300,7 @@ def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
     assert not [name for name in contents(processed(finished)) if "check" in name]
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
     """Killed again and again, at moments that move, until it is through; every file there is whole throughout."""
     wanted = contents(processed(analysed))

@@ -110,8 +110,8 @@ def in_ascii(home: Path, *words: str) -> subprocess.CompletedProcess:
     )
 
 
-@pytest.mark.medium
 @pytest.mark.skipif(sys.platform == "win32", reason="names are Unicode on Windows")
+@pytest.mark.slow
 def test_folders_and_files_named_in_any_script_work_in_a_system_of_ascii(tmp_path):
     folder = arm.write_study(tmp_path / "raw" / "größe-日本", periods=3)
     for log in ("slide", "push"):

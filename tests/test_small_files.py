@@ -173,8 +173,8 @@ def assert_read(path, channels: int, rows: int, total: float) -> None:
     assert [float(word) for word in text.split()] == pytest.approx([channels, rows, total], rel=1e-12), text
 
 
-@pytest.mark.medium
 @pytest.mark.parametrize("kind", ["variables", "cells"])
+@pytest.mark.slow
 def test_a_matlab_file_of_thousands_of_small_arrays_is_read(tmp_path, kind):
     """Of 30 000 cells the first 1000 are taken in; what is read are two variables beside them."""
     path, count, t = tmp_path / "log.mat", 30_000, np.arange(100.0)
@@ -192,7 +192,7 @@ def test_a_matlab_file_of_thousands_of_small_arrays_is_read(tmp_path, kind):
     assert_read(path, 2 + (1000 if kind == "cells" else count), len(t), float((t * t).sum()))
 
 
-@pytest.mark.medium
+@pytest.mark.slow
 def test_chunks_of_128_MB_are_unpacked_once(tmp_path):
     """Two channels of one and a quarter chunk each."""
     chunk, path = 1 << 24, tmp_path / "log.h5"

@@ -192,6 +192,7 @@ def study(seed, tare="", position=HUNG.position, tare_path=0.0):
     return analysed(logs, Weighing("heavy", replace(HUNG, position=position), tare))
 
 
+@pytest.mark.slow
 def test_a_hung_mass_is_found_within_its_interval():
     off = []
     for seed in range(30):
@@ -254,6 +255,7 @@ def test_free_motion_at_another_speed_is_part_of_the_error_of_each_joint():
         assert abs(free.mass - MASS) < 0.6 * abs(alone.mass - MASS)  # a joint counts less where it shows false masses
 
 
+@pytest.mark.slow
 def test_joints_with_the_same_errors_as_in_free_motion_do_not_contradict_each_other():
     weights = [study(seed)[0] for seed in range(40)]
     assert sum(weight.differing != "" for weight in weights) <= 2  # 1 % of 40, and a jackknife over six parts
@@ -277,6 +279,7 @@ def test_masses_that_agree_have_a_fair_probability():
     assert agreement([MassEstimate(0.1, 0.01)]) == (1.0, 1.0, 0)  # one joint contradicts nobody
 
 
+@pytest.mark.slow
 def test_a_run_of_free_motion_weighs_nothing_within_its_interval():
     free = [study(seed)[1] for seed in range(15)]
     off = [f.free_mass / f.free_mass_std for each in free for f in each.values()]

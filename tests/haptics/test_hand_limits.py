@@ -141,7 +141,7 @@ def test_the_best_delay_is_that_of_the_largest_limit_and_no_setting_changes():
     assert scenario.force_delay == 0.1
 
 
-@pytest.mark.medium
+@pytest.mark.slow
 def test_a_later_force_leaves_a_smaller_limit_and_a_weaker_one_a_larger_in_proportion():
     later = [limits.loop_response(replace(FULL, force_delay=delay)) for delay in (0.0, 0.05, 0.1)]
     assert (np.diff([response_limit(FIRM, *loop)[0] for loop in later]) < 0.0).all()

@@ -42,8 +42,8 @@ def searched(effect: dict[str, float]) -> SearchResult:
     return search.run(Processing(LOWPASS, 0.0))
 
 
-@pytest.mark.medium
 @pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.slow
 def test_each_effect_of_friction_has_a_term_that_the_search_takes_first(effect):
     put_in, terms = EFFECTS[effect]
     result = searched(put_in)

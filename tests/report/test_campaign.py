@@ -246,6 +246,7 @@ def test_a_trend_is_as_uncertain_as_weighted_least_squares_says():
     assert trend(np.array([0.0, 0.0, 1.0]), np.zeros(3), np.ones(3)) is None
 
 
+@pytest.mark.slow
 def test_what_is_constant_alarms_no_more_often_than_stated():
     random, alarms = np.random.default_rng(2), 0
     for _ in range(300):

@@ -101,6 +101,7 @@ def test_no_table_leaves_the_page_and_a_long_one_repeats_its_header(columns: int
 
 
 @poppler
+@pytest.mark.slow
 def test_no_cell_of_any_table_leaves_the_page() -> None:
     rng = random.Random(1)
 

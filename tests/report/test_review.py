@@ -96,7 +96,7 @@ def toml(*ratings: dict[str, str]) -> str:
     return re.sub(r"\\u(d[89ab]\w\w)\\u(d[c-f]\w\w)", lambda pair: json.loads(f'"{pair[0]}"'), "\n".join(lines))
 
 
-@pytest.mark.medium
+@pytest.mark.slow
 def test_the_next_report_shows_ratings_as_text_and_says_when_numbers_changed_since(finished):
     reports = finished.parents[1] / "reports" / "arm"
     page = (reports / "report.html").read_text()

@@ -130,6 +130,7 @@ print(hashlib.sha256(b"".join(x.tobytes() for x in results)).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_every_processor_computes_the_same_bytes(tmp_path):
     """No multiplication is fused with an addition, and sine and cosine are the library's."""
 

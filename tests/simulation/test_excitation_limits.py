@@ -172,6 +172,7 @@ def test_standard_errors_are_those_of_many_weighted_fits(two):
     assert np.isinf(expected_std(np.ones((9, 2)), np.ones(9))).all()
 
 
+@pytest.mark.slow
 def test_every_limit_holds_for_a_small_arm(two):
     problem = problem_of(two, harmonics=2, samples=40)
     assert_limits_hold(two, problem, design_together(problem, 1, 0).series, WORKSPACE)

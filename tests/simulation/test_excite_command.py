@@ -186,6 +186,7 @@ def test_a_robot_of_a_laboratory_can_be_excited_too(laboratory):
     assert found["within_limits"] is True
 
 
+@pytest.mark.slow
 def test_an_arm_of_a_urdf_is_excited_with_the_errors_that_it_may_expect(tmp_path):
     words = (str(write(tmp_path, 2)), "all", "--starts", "1", "--harmonics", "2", "--samples", "40")
     found = json.loads(call(*words, "--json", "--noise", "1,2", "--csv", str(tmp_path / "a.csv")))

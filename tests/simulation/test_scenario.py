@@ -198,6 +198,7 @@ def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
     assert law.gravity == 0.9
 
 
+@pytest.mark.slow
 def test_an_arm_without_control_falls_as_its_forward_dynamics_say(tmp_path):
     text = TWO_ARMS
     start, end = text.index("[arm.control]"), text.index("[family.matched.hand_roll]")

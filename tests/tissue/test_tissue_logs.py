@@ -66,7 +66,7 @@ def test_a_file_of_probes_needs_no_clock(tmp_path):
     assert summary[1]["rate"].isna().all()  # nobody may take the number of a sample for its time
 
 
-@pytest.mark.medium
+@pytest.mark.slow
 def test_the_report_of_a_user_s_probes_states_the_stiffness_without_the_thesis(tmp_path):
     folder = study(tmp_path)
     stages(folder, "ingest", "palpate", "report")
