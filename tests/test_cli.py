@@ -225,7 +225,7 @@ def test_help_shows_where_to_start_then_the_stages_in_panels_of_their_groups_the
             panels[-1][1].append(row[1])
     options, first, *groups, others = panels
     assert options[0] == "Options"
-    assert first == ("Start here", ["all", "new", "inspect", "compare", "report"])
+    assert first == ("Start here", ["all", "new", "inspect", "compare", "report", "guide"])
     assert groups == [(name, [*dict.fromkeys((name, *stages))]) for name, stages in GROUPS.items()]
     assert others == ("Other commands", [name for name in commands.COMMANDS if name not in first[1]])
 

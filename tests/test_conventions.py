@@ -382,7 +382,9 @@ def test_every_stage_and_command_explains_itself(name):
 
 
 def test_the_readme_names_every_command():
-    text = (HOME / "README.md").read_text()
+    text = (ROOT / "guide" / "reference" / "commands.md").read_text() + (
+        ROOT / "guide" / "reference" / "stages.md"
+    ).read_text()
     for name in ("all", *ALL, *commands.COMMANDS):
         assert f"`{name}`" in text or f"davinci-forces {name}" in text, name
 

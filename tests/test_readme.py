@@ -1,4 +1,4 @@
-"""What the README tells of names, keys and defaults is what the code has."""
+"""What README and guide tell of names, keys and defaults is what the code has, and what they lead to is there."""
 
 import json
 import re
@@ -55,12 +55,16 @@ from tests.conftest import ROOT
 
 PACKAGE = ROOT / "pipeline" / "davinci_forces"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+GUIDE = PACKAGE / "guide"
+PAGES = {file.stem: file.read_text(encoding="utf-8") for file in sorted(GUIDE.rglob("*.md"))}
+CHANGES = [file.stem for file in (GUIDE / "changes").glob("*.md")]
+TEXT = "\n\n".join([README, *(text for name, text in PAGES.items() if name not in CHANGES)])
 SPAN = re.compile(r"`([^`]+)`")
 
 
 def rows(*header: str) -> list[list[str]]:
     """The cells of the rows of the one table whose header begins with these words."""
-    lines = README.splitlines()
+    lines = [*TEXT.splitlines(), *PAGES["0.2.0"].splitlines()]
     [start] = [i for i, line in enumerate(lines) if line.startswith("| " + " | ".join(header) + " |")]
     table = []
     for line in lines[start + 2 :]:
@@ -101,7 +105,7 @@ def test_settings_are_those_that_there_are_with_their_defaults():
 
 
 def test_the_robot_that_is_shown_is_one(tmp_path):
-    [text] = [block for block in re.findall(r"```toml\n(.*?)```", README, re.S) if "[[joint]]" in block]
+    [text] = [block for block in re.findall(r"```toml\n(.*?)```", PAGES["robot-file"], re.S) if "[[joint]]" in block]
     (tmp_path / "my_arm.toml").write_text(text)
     robot = robots.load("my_arm.toml", tmp_path)
     assert [joint.name for joint in robot.joints] == ["shoulder"]
@@ -110,7 +114,7 @@ def test_the_robot_that_is_shown_is_one(tmp_path):
 def test_roles_are_those_that_there_are():
     listed = [role.strip() for row in rows("role") for role in row[0].split(",")]
     assert sorted(listed) == sorted(ROLES)
-    comment = re.search(r"^role = .*# (.*)$", README, re.M)[1]
+    comment = re.search(r"^role = .*# (.*)$", PAGES["own-arm"], re.M)[1]
     assert re.split(r", | or ", comment) == list(ROLES)
 
 
@@ -141,14 +145,15 @@ def test_formats_and_what_they_need_are_those_that_there_are():
 
 
 def test_units_are_those_that_there_are():
-    told = re.search(r"Units: (.*?), and rates", README, re.S)[1]
+    told = re.search(r"Units: (.*?), and rates", TEXT, re.S)[1]
     names = set(re.findall(r"m?N m\b|[^\s,]+", told.replace("N mN", "N, mN")))
     assert names == {unit for unit in UNITS if "/" not in unit}
 
 
 def test_keys_of_a_study_and_its_logs_are_all_told():
-    code = README.partition("```toml")[2].partition("```")[0]
-    said = re.sub(r"```.*?```", "", README.partition("## In Python")[0], flags=re.S)
+    code = PAGES["own-arm"].partition("```toml")[2].partition("```")[0]
+    pages = "\n".join(PAGES[name] for name in ("own-arm", "study", "robot-file", "clocks", "roles", "record"))
+    said = re.sub(r"```.*?```", "", pages, flags=re.S)
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(AttachedMass)} | {"file"} <= told
@@ -171,7 +176,7 @@ def test_formats_of_an_export_are_those_that_there_are():
 def test_targets_of_the_makefile_are_all_told():
     makefile = (ROOT / "Makefile").read_text()
     targets = set(re.findall(r"^([a-z]+):.*##", makefile, re.M))
-    listed = set(spans(README.partition("targets of the Makefile:")[2].partition("\n\n")[0]))
+    listed = set(spans(PAGES["contributing"].partition("targets of the Makefile:")[2].partition("\n\n")[0]))
     assert listed == targets
     for target in named(rows("while you work")):
         assert target.removeprefix("make ") in targets
@@ -198,9 +203,11 @@ def test_old_names_are_gone_and_new_ones_there():
 def test_the_version_to_be_cited_is_the_package_s():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"(version {version})" in README
-    assert f"version = {{{version}}}" in README
-    newest = re.search(r"^### (\S+)", README.partition("## Changelog")[2], re.M)[1]
-    assert newest == version == davinci_forces.__version__ == "0.2.0.dev0"
+    assert f"\nversion: {version}\n" in (GUIDE / "CITATION.cff").read_text()
+    assert version == davinci_forces.__version__
+    newest = max(CHANGES, key=lambda name: tuple(map(int, name.split("."))))
+    assert version in (newest, f"{newest}.dev0")
+    assert ("unreleased" in PAGES[newest].partition("\n")[0]) == version.endswith(".dev0")
 
 
 WORD = {"source": r"(?:found|table-6\.1|table-6\.1-corrected)"}  # the words of keys that may hold a dot
@@ -281,7 +288,7 @@ def test_keys_of_a_study_are_told_and_those_told_are_there(analysed, tmp_path):
 @pytest.mark.medium
 def test_the_lines_of_python_run_as_they_are_written(analysed, tmp_path, capsys):
     shutil.copytree(analysed.parent.parent, tmp_path / "lab")
-    code = README.partition("```python\n")[2].partition("```")[0]
+    code = PAGES["python"].partition("```python\n")[2].partition("```")[0]
     exec(code.replace("raw/davinci-demo", str(tmp_path / "lab" / "raw" / "arm")), {})
     printed = capsys.readouterr().out
     assert "nothing to do, all stages are up to date" in printed
@@ -289,21 +296,46 @@ def test_the_lines_of_python_run_as_they_are_written(analysed, tmp_path, capsys)
     assert "kg m^2" in printed
 
 
-def test_the_study_file_of_the_readme_is_one(tmp_path):
-    (tmp_path / "study.toml").write_text(README.partition("```toml\n")[2].partition("```")[0])
+def test_the_study_file_of_the_guide_is_one(tmp_path):
+    (tmp_path / "study.toml").write_text(PAGES["own-arm"].partition("```toml\n")[2].partition("```")[0])
     study = reading.read(tmp_path)
     assert study.settings == Settings(effort={"hand_roll": 0.5})  # the others as they are by default
     assert study.logs[0].joints == ("hand_roll",)
 
 
-def test_what_python_is_offered_is_what_the_readme_shows():
-    code = README.partition("```python\n")[2].partition("```")[0]
+def test_what_python_is_offered_is_what_the_guide_shows():
+    code = PAGES["python"].partition("```python\n")[2].partition("```")[0]
     assert set(davinci_forces.__all__) <= set(re.findall(r"davinci_forces\.(\w+)\(", code))
 
 
-def test_the_readme_leads_to_files_that_are_there():
-    for file in re.findall(r"`((?:pipeline|tests|raw/d)[\w./-]*\.(?:py|md|toml))`", README):
+def test_readme_and_guide_lead_to_files_that_are_there():
+    for file in re.findall(r"`((?:pipeline|tests|raw/d)[\w./-]*\.(?:py|md|toml))`", TEXT):
         assert Path(ROOT / file).is_file(), file
+    for page in [ROOT / "README.md", *GUIDE.rglob("*.md")]:
+        for link in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)|src=\"([^\"]+)\"", page.read_text(encoding="utf-8")):
+            assert (page.parent / "".join(link)).is_file(), (page.name, link)
+
+
+def test_no_page_is_left_out_of_the_index_and_none_has_the_name_of_another():
+    topics = [file.stem for file in GUIDE.rglob("*.md")]
+    assert len(topics) == len(set(topics))
+    linked = {Path(link).stem for link in re.findall(r"\]\(([\w./-]+\.md)\)", PAGES["index"])}
+    assert linked == {*topics} - {"index", "contributing", "changes", *CHANGES}
+
+
+def test_the_readme_is_two_screens_to_the_first_result_and_not_much_more():
+    assert len(README.splitlines()) <= 130
+    assert len(README.split()) <= 1000
+    assert README.index("make all") < 4000
+
+
+@pytest.mark.medium
+def test_the_lines_of_python_of_the_readme_and_of_streams_run(analysed, tmp_path, capsys):
+    shutil.copytree(analysed.parent.parent, tmp_path / "lab")
+    for text in (README, PAGES["stream"]):
+        for code in re.findall(r"```python\n(.*?)```", text, re.S):
+            exec(code.replace("raw/davinci-demo", str(tmp_path / "lab" / "raw" / "arm")), {})
+    assert "starting" in capsys.readouterr().out
 
 
 def test_estimators_are_those_that_there_are():

@@ -162,7 +162,7 @@ def test_page_one_says_that_the_path_is_the_one_that_was_fitted_and_which_band_i
         ("instrument_slide", "Instrument slide"),
     ):
         is_narrow = results[f"effort.one-noweight.{joint}.coverage"] < 0.90
-        assert (f"{name}, one-noweight</strong>: the 95 % band covers only" in page) == is_narrow
+        assert (f"{name}, one-noweight</strong>: the 95 % band is too narrow: it covers only" in page) == is_narrow
     assert "SIMULATED" not in page
 
 

@@ -199,9 +199,16 @@ def median_and_90th_percentile(text: str) -> tuple[float, float]:
     return median(lengths), quantiles(lengths, n=10)[-1]
 
 
-def test_sentences_of_readme_are_short():
-    text = re.sub(r"```.*?```|<[^>]*>", "", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
-    prose = "\n".join(line for line in text.splitlines() if not line.startswith(("|", "#")))
+GUIDE = PACKAGE / "guide"
+PROSE = [ROOT / "README.md", *sorted(p for p in GUIDE.rglob("*.md") if p.parent.name not in ("reference", "changes"))]
+
+
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.stem)
+def test_sentences_of_readme_and_guide_are_short(page):
+    text = re.sub(r"```.*?```|<[^>]*>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    prose = "\n".join(line for line in text.splitlines() if not line.startswith(("|", "#", "    ")))
+    if len(sentences(prose)) < 5:
+        return
     middle, long = median_and_90th_percentile(prose)
     assert middle <= MEDIAN_SENTENCE
     assert long <= LONG_SENTENCE

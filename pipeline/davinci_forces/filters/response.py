@@ -13,12 +13,13 @@ import numpy as np
 from davinci_forces.filters import DEFAULT, ekf, tracker
 from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, stationary_joint
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import VISCOUS
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
 
 DURATION = 1.0  # [s] duration of the push
-MIN_SHARE, MAX_PUSH_DELAY = 0.9, 0.1  # estimated peak / peak of the push; [s], unless the settings state another
+MIN_SHARE = 0.9  # estimated peak / peak of the push
 BEFORE, AFTER = 2.0, 1.0  # [s] before and after the push, in the trial on a joint at rest
 WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, in units of inertia * velocity noise / T_s
 BISECTIONS = 60  # halvings of the logarithmic search range
@@ -64,7 +65,7 @@ def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
 
 @lru_cache(CACHED_WALKS)
 def smallest_q_tau(
-    track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel, delay: float = MAX_PUSH_DELAY
+    track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel, delay: float = PUSH_DELAY
 ) -> float:
     """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push within `delay` [s].
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import MAX_PUSH_DELAY, smallest_q_tau
+from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.constants import PUSH_DELAY
 
 ROUNDS = 4  # number of rounds that fit the likelihood and the push in turn
 MAX_LOG_CHANGE = np.log(1e3)  # largest change of a standard deviation's logarithm from the start of the search
@@ -20,7 +21,7 @@ MAX_SAMPLES_TUNING = 20_000  # at most this number of each recording's samples i
 
 
 def tune_noise(
-    recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float, delay: float = MAX_PUSH_DELAY
+    recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float, delay: float = PUSH_DELAY
 ) -> NoiseModel:
     """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
 

@@ -12,12 +12,13 @@ import numpy as np
 
 from davinci_forces.filters import ekf, sample
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.response import MAX_PUSH_DELAY, smallest_q_tau
+from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
 from davinci_forces.haptics.maths.delay import Complex, harmonic, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.simulation.step import Friction
 from davinci_forces.maths.simulation.surroundings import Path
@@ -58,7 +59,7 @@ def complete_scenario(
     noise: AxisNoise = SLIDE_NOISE,
     stiffness: float = THESIS_TISSUE,
     q_tau: float = 0.0,
-    delay: float = MAX_PUSH_DELAY,
+    delay: float = PUSH_DELAY,
 ) -> HapticScenario:
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body

@@ -13,8 +13,8 @@ import numpy as np
 
 from davinci_forces import toml
 from davinci_forces.errors import PipelineError
-from davinci_forces.filters.response import MAX_PUSH_DELAY
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
+from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
 from davinci_forces.robots.from_toml import NAME
 from davinci_forces.toml import TomlTable
@@ -87,7 +87,7 @@ class HapticScenario:
     assumed_body: Body | None = None  # body that the filter assumes
     filtered: bool = True  # whether the extended Kalman filter estimates the force; else the true force is sent
     q_tau: float = 0.0  # random walk of the external effort [N/s^0.5]; 0 selects the slowest that shows a push
-    filter_delay: float = MAX_PUSH_DELAY  # [s] by which the filter may show a push late, from the settings of a study
+    filter_delay: float = PUSH_DELAY  # [s] by which the filter may show a push late, from the settings of a study
     stiffness: float | None = None  # [N/m]
     damping: float = 5.0  # [N s/m]
     friction: float = 0.05  # friction force along the tool over pressing force
