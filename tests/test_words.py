@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from statistics import median, quantiles
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "pipeline" / "davinci_forces"
 
@@ -207,7 +209,7 @@ PROSE = [ROOT / "README.md", *sorted(p for p in GUIDE.rglob("*.md") if p.parent.
 def test_sentences_of_readme_and_guide_are_short(page):
     text = re.sub(r"```.*?```|<[^>]*>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     prose = "\n".join(line for line in text.splitlines() if not line.startswith(("|", "#", "    ")))
-    if len(sentences(prose)) < 5:
+    if len(list(sentences(prose))) < 5:
         return
     middle, long = median_and_90th_percentile(prose)
     assert middle <= MEDIAN_SENTENCE
