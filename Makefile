@@ -94,7 +94,7 @@ demo: $(READY) ## simulate the demonstration study anew
 
 pictures: ## draw the README's pictures anew, from the report of the demonstration study (needs pdftoppm)
 	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/page-one
-	pdftoppm -r 65 -f 8 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
+	pdftoppm -r 65 -f 9 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
 
 clean: ## remove what was made: processed files, reports, environment
 	rm -rf .venv build *.egg-info processed/* reports/*

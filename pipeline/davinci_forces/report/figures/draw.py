@@ -35,6 +35,7 @@ SYMBOL_SIZE, BAR_END = 2.6, 2.0  # [pt] diameter of a point, half-width of the e
 MANY = 60  # more stems than this are thin and have no heads, so that marks behind them stay visible
 BARS_WIDTH, BAR_SHARE = 0.8, 0.92  # of the distance of two names: all bars of a name; of its place: one bar
 TILE = 0.96  # of its place: one tile
+BESIDE = 4.0  # [pt] from a point to its name
 
 
 class Frame(NamedTuple):
@@ -126,8 +127,12 @@ def draw_points(mark: Points, frame: Frame) -> str:
         else error_bars(x, frame.place_y(mark.y - mark.y_std), frame.place_y(mark.y + mark.y_std), colour)
     )
     svg += path(symbols(x, y), dots(colour))
-    for a, b, above, name in zip(x.tolist(), y.tolist(), (mark.y >= 0).tolist(), mark.names, strict=False):
-        svg += words(a, b - 4 if above else b + 4 + 0.8 * SMALL_SIZE, name, colour, SMALL_SIZE, "middle")
+    far = (
+        frame.left + 0.88 * frame.width
+    )  # beyond it a name stands to the left; above a point it would squeeze the curve
+    for a, b, name in zip(x.tolist(), y.tolist(), mark.names, strict=False):
+        shift, anchor = (-BESIDE, "end") if a > far else (BESIDE, "start")
+        svg += words(a + shift, b + 0.35 * SMALL_SIZE, name, colour, SMALL_SIZE, anchor)
     return svg
 
 

@@ -36,7 +36,7 @@ VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = 6, 30, 3
 LETTER_WIDTH = 1.65  # [mm] width of a character of a label
 LINE_HEIGHT = 3.9  # [mm] height of a line of a label or a row of a legend
 SAMPLE = 12.0  # [mm] width of the sample before a legend entry, with the gaps around it
-NAME = 3.6  # [mm] height of a point's name above or below the point
+NAME = 3.6  # [mm] height of a point's name beside the point
 ABOUT = 18.0  # [mm] of a panel's height for the words above and below the axes
 DIGIT = 1.8  # [mm] width of a character of the numbers on an axis
 TICK = 2.6  # [mm] from an axis to its numbers, and from the numbers to the label
@@ -180,8 +180,7 @@ def _up(panel: Panel, height: float) -> Axis:
         return axis_over([np.array(panel.y_range)], (0.0, 0.0), panel.y_log, label).with_numbers(Y_STEPS)
     columns = [y for mark in panel.marks for y in _extent(mark)[1]]
     names = any(isinstance(mark, Points) and mark.names for mark in panel.marks)
-    room = height - ROW_ABOVE - ABOUT / 2
-    margin = Y_MARGIN + (NAME / max(room - 2 * NAME, NAME) if names else 0.0)
+    margin = Y_MARGIN + (0.5 * NAME / max(height - ROW_ABOVE - ABOUT / 2, 4.0 * NAME) if names else 0.0)
     stands = any(isinstance(mark, Bars | Histogram) for mark in panel.marks) and all(_least(y) >= 0 for y in columns)
     axis = axis_over(columns, (0.0 if stands else margin, margin), panel.y_log, label).with_numbers(Y_STEPS)
     return replace(axis, label=wrap_label(" ".join(axis.label.split()), height - ABOUT))

@@ -67,7 +67,7 @@ def blocks(context: Context) -> Iterator[Block]:
         compared = comparison(context, comparisons), overlay(comparisons), noise_over_delay(noises)
         yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
     if logs := context.catalogue.records(Streamed):
-        yield stream_table(context, logs)
+        yield OnScreen("The same filter as samples arrive", "filters-streamed", (stream_table(context, logs),))
 
 
 def worst_track(context: Context, joint: str) -> Iterator[Track]:

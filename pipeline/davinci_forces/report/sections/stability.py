@@ -32,7 +32,7 @@ ROWS = (
     ("k_t_response", "Linear response", SAME),
     ("k_t_simulated", "Simulation", SAME),
     ("k_t_settles", "Simulation, all effects", f"{SAME}; friction of the arm, damping of the tissue"),
-    ("k_t_cqlf", "Lyapunov function (8.10)", NO_DELAY),
+    ("k_t_cqlf", "Lyapunov function", NO_DELAY),
     ("k_t_switching", "Worst switching", NO_DELAY),
     ("limit_frequency", "Frequency at the limit", ""),
     ("filter_lag", "Filter’s lag, in logs", "at that frequency"),
@@ -136,7 +136,7 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
 def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Figure:
     """The map without delay, and the limit over an additional delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, hand of (8.10) without delay: up to which a Lyapunov function exists "
+        "Limits of the tissue's stiffness. Left, the hand without delay: up to which a Lyapunov function exists "
         "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
         "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
         (map_panel(context, tissues), delay_panel(context, limits, tissues)),

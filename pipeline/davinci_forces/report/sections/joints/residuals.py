@@ -27,11 +27,14 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
+    moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
+    averaged = bool(moved) and len(moved[0].q) == len(errors)
+    kind = "averaged" if averaged else "low-passed"
     yield Figure(
-        f"{name}: averaged effort and model ({who}), the residual of the model, and its normal probability plot.",
-        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
+        f"{name}: {kind} effort and model ({who}), the residual of the model, and its normal probability plot.",
+        f"{name}: the model follows the {kind} effort up to {errors.std():.2g} (root mean square).",
         (
-            effort_panel(residual, heading="Averaged effort and model"),
+            effort_panel(residual, heading=f"{kind.capitalize()} effort and model"),
             Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
             normal_plot("Residual", errors, label(residual, "tau", "residual")),
         ),
@@ -39,8 +42,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
         columns=3,
         height=34,
     )
-    moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
-    q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
+    q = moved[0].q if averaged else None
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
