@@ -190,6 +190,14 @@ def test_a_robot_without_a_geometry_has_no_tip():
     assert not list(resolve.apply(tracks("davinci", noise(3)), [], [], entry(role="contact"), robot))
 
 
+def test_a_tip_that_no_pose_determines_is_refused_with_a_remedy():
+    robot = load("davinci", Path())
+    robot = replace(robot, chain=replace(robot.chain, tip="0"))  # a frame that no joint moves
+    [said] = resolve.apply(tracks("davinci", noise(3)), [], [], entry(role="contact"), robot)
+    assert "add a fixed link to the tip of the tool" in said.text[0]
+    assert not list(resolve.apply(tracks("davinci", noise(3)), [], [], entry(role="validation"), robot))
+
+
 def test_samples_near_a_singular_pose_are_marked_and_not_judged():
     centre = float(tip_force.singular_slides(load("davinci", Path()).chain, 0.0)[0])
     q = path("davinci", centre + 0.03)

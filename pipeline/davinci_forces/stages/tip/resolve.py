@@ -9,7 +9,7 @@ from davinci_forces.maths.contact.detection import TIP_REACH
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared_correlations
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, is_singular, matrix, shared_correlations
 from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
@@ -89,6 +89,12 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     tracks = [by_joint[name] for name in names]
+    if bool(is_singular(robot.chain, np.stack([track.q for track in tracks], axis=-1)).all()):
+        if entry.role in ("contact", "tissue"):
+            why = "no pose determines all its directions, as where the last frame lies on a joint's axis"
+            message = f"{entry.name}: no force at the tip: {why}; add a fixed link to the tip of the tool"
+            yield diagnostic("resolve", entry.name, "note", message)
+        return
     free = free_of(tracks, entry) & entry.has_known_free_motion
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
