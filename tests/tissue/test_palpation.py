@@ -212,6 +212,15 @@ def test_the_interval_of_the_slide_carries_the_error_of_its_model():
     assert unknown.stiffness_std_model == pytest.approx(3 * large.stiffness_std_model)
 
 
+def test_damping_by_the_slide_carries_the_error_of_friction():
+    """An error of 1 N that reverses with the motion, at 8 mm/s, reads as a damping of 125 N s/m."""
+    small, large = (palpated(tracks=[slid(model=model)])[2] for model in (0.0, 1.0))
+    [row] = np.flatnonzero(small.law == "Kelvin-Voigt")
+    assert large.damping_std[row] == pytest.approx(np.hypot(small.damping_std[row], 1 / 0.008), rel=0.05)
+    [spring] = np.flatnonzero(small.law == "spring")
+    assert large.damping_std[spring] == 0.0
+
+
 def test_a_slide_that_pushes_towards_lower_positions_meets_the_same_tissue():
     tissue, *_ = palpated(tracks=[slid(way=-1.0, rest=-6.0)])
     assert tissue.stiffness == pytest.approx(K, rel=0.02)

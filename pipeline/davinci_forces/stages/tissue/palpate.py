@@ -72,7 +72,7 @@ def run(
     by_joint = touch is None or not has_force(touch)
     yield stiffness_of(touched, entry.name, slide.joint if by_joint and slide else "force sensor", len(pushes))
     if best is not None:
-        yield model_of(models, best, why, touched, entry.name)
+        yield model_of(models, best, why, touched, entry.name, float(np.median(data.std)))
 
 
 def numbered_pushes(data: Probing) -> list[tuple[Column, Column]]:
@@ -242,12 +242,23 @@ def onset_time_std(push: PalpatedPush) -> float:
 
 
 def model_of(
-    models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[PalpatedPush], log: str
+    models: Sequence[FittedLaw],
+    best: FittedLaw,
+    why: str,
+    pushes: Sequence[PalpatedPush],
+    log: str,
+    model_std: float,
 ) -> TissueModel:
-    """Stiffness and damping of each model of the tissue at half the median depth of the pushes."""
+    """Stiffness and damping of each model of the tissue at half the median depth of the pushes.
+
+    The force of a joint errs by `model_std`.  An error of friction reverses with the motion, as damping does.
+    """
     middle = float(np.median([push.depth_in_contact[push.contact.inside].max() for push in pushes])) / 2
     stiff, damping = np.array([tangent(model, middle) for model in models]).T
     stiff_std, damping_std, exponent_std = np.array([standard_errors(model, middle) for model in models]).T
+    speed = float(np.mean(np.abs(np.concatenate([push.rate[push.contact.inside] for push in pushes]))))
+    if speed > 0.0:
+        damping_std = np.where(damping != 0.0, np.hypot(damping_std, model_std / speed), damping_std)
     return TissueModel(
         log=log,
         chosen=best.law.name,
