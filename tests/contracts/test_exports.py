@@ -46,6 +46,14 @@ def test_every_file_says_where_it_comes_from_and_that_it_is_no_medical_device(na
     assert not any(word in text for text in renderer(name)(honest).values() for word in ("SIMULATED:", "despite: "))
 
 
+def test_limits_are_those_of_the_robot_and_null_where_it_states_none():
+    for robot in (DAVINCI, PSM):
+        for joint, about in zip(robot.joints, export(robot, "independent").document()["joints"], strict=True):
+            assert about["limits"]["position"] == [x if np.isfinite(x) else None for x in joint.limits.q]
+            largest = joint.limits.effort
+            assert about["limits"]["effort"] == ([-largest, largest] if np.isfinite(largest) else [None, None])
+
+
 def test_a_study_without_a_chosen_model_or_a_joint_exports_nothing(lab, catalogue):
     nothing = Catalogue(lambda kind: [] if kind is Choice else catalogue.records(kind))
     with pytest.raises(BadRequest, match="no model was chosen"):

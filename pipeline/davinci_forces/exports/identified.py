@@ -163,8 +163,18 @@ def _term(term: Term) -> dict[str, Any]:
 def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
     i, units = joint.model.efforts.index(joint.name), {name: joint.joint.unit(unit) for name, unit in UNITS.items()}
     motion = {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]}
-    about = {"name": joint.name, "kind": joint.joint.kind.value, "verdict": verdict, "model": ".".join(joint.fit.key)}
-    return {**about, "units": units, "motion": motion, "validity": joint.validity, "filter": joint.filter}
+    bounds = {name: getattr(joint.joint.limits, symbol) for name, symbol in (("position", "q"), ("velocity", "dq"))}
+    limits = {name: [x if isfinite(x) else None for x in ends] for name, ends in bounds.items()}
+    effort = joint.joint.limits.effort
+    limits["effort"] = [-effort, effort] if isfinite(effort) else [None, None]
+    about: dict[str, Any] = {
+        "name": joint.name,
+        "kind": joint.joint.kind.value,
+        "verdict": verdict,
+        "model": ".".join(joint.fit.key),
+    }
+    about |= {"units": units, "motion": motion, "limits": limits}
+    return about | {"validity": joint.validity, "filter": joint.filter}
 
 
 def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: Sequence[str] = ()) -> Export:
