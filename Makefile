@@ -113,6 +113,7 @@ $(READY): requirements.lock pyproject.toml
 	$(PINNED) requirements.lock
 	@$(BIN)/python -c "$$FORGET"
 	$(INSTALL) --no-build-isolation -e .
+	@$(INSTALL) --slim
 	@touch $@
 
 $(READY_TO_TEST): $(READY) tests/test.lock

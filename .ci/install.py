@@ -1,15 +1,18 @@
 """Install packages into the environment of this interpreter: by uv, or by pip where uv fails for any reason.
 
     python .ci/install.py --require-hashes -r LOCK
+    python .ci/install.py --slim
 
 The arguments are those of `pip install`.  uv is the machine's, or pip brings the pinned one into the environment.  It
 needs a third of pip's processor time.  It gets pip's settings: package indexes, folders of wheels, certificates.
+`--slim` removes what running does not need: that uv, and the tests of packages, a tenth of the environment.
 """
 
 import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
@@ -27,7 +30,9 @@ SETTINGS = {  # pip's setting -> uv's variable
 
 
 def main(*arguments: str) -> int:
-    """Install packages, without what they need in turn; the exit code."""
+    """Install packages, without what they need in turn, or remove what running does not need; the exit code."""
+    if arguments == ("--slim",):
+        return slim()
     try:
         command = [uv(), "pip", "install", "-q", "--python", sys.executable, "--no-deps", *arguments]
         subprocess.run(command, check=True, env=os.environ | settings())
@@ -35,6 +40,13 @@ def main(*arguments: str) -> int:
         print(f"uv could not install ({error}), so pip does: {' '.join(arguments)}", file=sys.stderr)
         return subprocess.run([*PIP, "install", "--no-deps", *arguments]).returncode
     return 0
+
+
+def slim() -> int:
+    """Remove uv and the tests of packages from the environment; the exit code."""
+    for folder in [*Path(sysconfig.get_path("purelib")).glob("*/**/tests")]:
+        shutil.rmtree(folder, ignore_errors=True)
+    return subprocess.run([*PIP, "uninstall", "-y", "uv"], capture_output=True).returncode
 
 
 def uv() -> str:

@@ -1,12 +1,13 @@
 """Change the code in one place at a time, and see whether a test fails: `make mutants` (SEED=n, COUNT=n).
 
 A mutant is one operator, comparison or number of a module that is changed to another.  Test files that import the
-module run first, then those that import what imports it, then all other fast ones up to `MAX_FILES`.  A mutant that no
-test notices survives: either a test is missing, or the change is of no consequence.
+module run first, then those that import what imports it, up to `MAX_FILES`, and at last the slow tests of these files.
+A mutant that no test notices survives: either a test is missing, or the change is of no consequence.
 """
 
 import argparse
 import ast
+import os
 import random
 import re
 import shutil
@@ -112,19 +113,28 @@ def is_noticed(mutant: Mutant, tree: Path) -> str:
     """Return the test that fails with a mutant in a copy of the tree; "" if none does."""
     file = tree / mutant.file
     whole = file.read_bytes()
-    file.write_bytes(whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
     try:
-        for test in tests_for(mutant):
-            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
-            try:
-                done = subprocess.run(command, cwd=tree, capture_output=True, text=True, timeout=TIMEOUT)
-            except subprocess.TimeoutExpired:
-                return f"{test} (it does not end)"
-            if done.returncode not in (0, 5):
-                return test
+        replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
+        for options in ([], ["--slow", "-m", "slow"]):
+            for test in tests_for(mutant):
+                command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *options, test]
+                environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(tree / "pipeline")}
+                try:
+                    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, timeout=TIMEOUT)
+                except subprocess.TimeoutExpired:
+                    return f"{test} (it does not end)"
+                if done.returncode not in (0, 5):
+                    return test
     finally:
-        file.write_bytes(whole)
+        replace_source(file, whole)
     return ""
+
+
+def replace_source(file: Path, code: bytes) -> None:
+    """Write a module, and remove its bytecode, which Python takes for current if the time is the same."""
+    for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*"):
+        compiled.unlink()
+    file.write_bytes(code)
 
 
 def main() -> None:
@@ -136,7 +146,7 @@ def main() -> None:
     survivors = []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder, "tree")
-        left_out = shutil.ignore_patterns(".git", ".venv", "__pycache__", "processed", "reports", ".*_cache")
+        left_out = shutil.ignore_patterns(".git", ".venv", "processed", "reports", ".*_cache")
         shutil.copytree(ROOT, tree, ignore=left_out)
         for name in ("processed", "reports"):
             (tree / name).mkdir()

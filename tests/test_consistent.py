@@ -136,7 +136,7 @@ def test_no_link_is_impossible_where_least_squares_find_one_that_is():
 def test_the_arm_is_the_nearest_by_the_conditions_of_karush_kuhn_and_tucker(noise):
     """The gradient by each pseudo-inertia is a positive semidefinite matrix at right angles to it."""
     R, *_ = pose(impossible(), noise)
-    mechanism, size = ARM.mechanism, np.sqrt(R.y @ R.y + R.squares)
+    mechanism, size = ARM.mechanism, np.sqrt(R.y @ R.y + R.min_squares)
     made = nearest(R, mechanism)
     F = (R.U * R.scale) @ mechanism.matrix
     cones = scale_unknowns(F, mechanism)

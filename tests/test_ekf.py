@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, rts, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import lag, noise_model, push_response_at_rest, smallest_q_tau
+from davinci_forces.filters.response import lag_error, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths.models.bias import bias
@@ -195,7 +195,7 @@ def test_the_lag_is_what_the_filter_misses_of_a_push():
     fast = NOISE._replace(q_tau=1.0)
     recording = recorded(arm.joint("hand_roll").terms, np.array([0.4528, 0.0, 0.3706, 0.0]), (still, still), push)
     smooth = rts.track(recording, fast).tau_ext
-    late = lag([recording], smooth, fast)
+    late = lag_error([recording], smooth, fast)
     missed = push - ekf.track(recording, fast).tau_ext
     assert np.abs(missed).max() > 0.01
     assert_allclose(late, missed, atol=0.35 * np.abs(missed).max())  # the smoother rounds the corners

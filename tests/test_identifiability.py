@@ -14,7 +14,7 @@ from davinci_forces.identification.identifiability import (
     describe_correlated,
     describe_insignificant,
     hardly_described,
-    inertia_at_fault,
+    why_not_positive,
 )
 from davinci_forces.maths.estimation.least_squares import (
     analyse_columns,
@@ -105,12 +105,12 @@ def guess(theta, std) -> Estimate:
 
 
 def blamed(theta, std, others=()) -> str:
-    return inertia_at_fault(arm.ARM, ROLL, guess(theta, std), of(PHI), others)
+    return why_not_positive(arm.ARM, ROLL, guess(theta, std), of(PHI), others)
 
 
 def test_an_inertia_that_was_not_excited_is_not_blamed_on_signs():
     said = blamed([-0.07, 0.01, 0.37, 0.22], [0.25, 0.01, 0.01, 0.01])
-    assert "-0.07 ± 0.2 kg m^2 may be positive, because the motion hardly excites it" in said
+    assert "-0.07 ± 0.2 kg m^2 cannot be distinguished from 0, because the motion hardly excites it" in said
     assert "accelerating more: `davinci-forces excite arm.toml hand_roll`" in said
     assert "sign" not in said
 
@@ -126,7 +126,7 @@ def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_ou
     assert "the signs are right" in said
     assert "logged at different times" in said
     coupled = blamed([-0.45, 0.01, 0.37, 0.22], [0.01] * 4, ["pan", "lift"])
-    assert "pan and lift move in the same logs" in coupled
+    assert "leaves out the effects of pan and lift in the same logs" in coupled
     assert "record the joint by itself" in coupled
 
 

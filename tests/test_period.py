@@ -132,7 +132,7 @@ def test_less_than_two_periods_are_not_averaged_and_refused_where_a_period_is_st
     with pytest.raises(NotPeriodic, match=r"19.00 s contain no motion that repeats at least twice.*skip and until"):
         run(moved(np.arange(1900) / RATE), period=10.0)
     [note] = average.run([moved(np.arange(1900) / RATE)], entry(), arm.ARM, harmonics=0, lowpass=17.0)
-    assert note.text[0].endswith("nothing is averaged; its parameters come from the low-passed samples")
+    assert note.text[0].endswith("nothing is averaged; parameters are fitted to its low-passed samples")
 
 
 @pytest.mark.parametrize("T", [100.7, 1000.3, 9999.0, 33_333.3])

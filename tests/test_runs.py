@@ -385,7 +385,7 @@ def test_a_study_is_read_back_as_a_frame_with_its_units(analysed):
 
 
 def test_reading_what_is_not_there_says_what_there_is(analysed, study):
-    with pytest.raises(BadRequest, match="no record 'Tracks'; there are Links, Pose"):
+    with pytest.raises(BadRequest, match="no kind of record 'Tracks'; the kinds are Links, Pose"):
         davinci_forces.read(analysed, "Tracks")
     with pytest.raises(BadRequest, match="Track has no arm; it has log, joint"):
         davinci_forces.read(analysed, "Track", arm="left")

@@ -500,7 +500,7 @@ def test_a_mass_may_be_left_out_and_move_with_a_link_or_a_joint(tmp_path):
     ("written", "says"),
     [
         (HANGS.replace('"5"', '"elbow"'), "8: log 'a'.weight: moves_with must be one of hand_roll, hand_pitch, "),
-        (HANGS.replace("0.2]", "200]"), "8: log 'a'.weight: position must lie within 3 m of the remote centre, not "),
+        (HANGS.replace("0.2]", "200]"), "8: log 'a'.weight: each coordinate of position must lie within 3 m, not "),
         (HANGS.replace("0.2]", "0.2], mass = -1"), "8: log 'a'.weight: mass must be finite and greater than 0, not -1"),
         (HANGS.replace("0.2]", "0.2], masss = 1"), "unknown key 'masss'; known keys are mass, moves_with, position"),
         (HANGS + '\ntare = "b"', "9: log 'a': tare = 'b' is not a log of this study; its logs are a, empty"),

@@ -42,7 +42,7 @@ def problem(name: str, theta=None, seed: int = 3, known: bool = True) -> Regress
 def least(p: Regression) -> tuple:
     """The triangle of a problem, and the least squares that the known signs allow."""
     R = triangle(p.Phi, p.tau, p.periods.astype(float))
-    return R, R.squares + float(R.excess(solve_bounded(R, p.known.positive)))
+    return R, R.min_squares + float(R.excess(solve_bounded(R, p.known.positive)))
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["physical", "lumped"])

@@ -115,7 +115,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     atexit.register(ignore_signals)  # a signal that arrives while Python ends would end it without a message
     for number in STOP_SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN:  # a background process of a script ignores the signal
+        if signal.getsignal(number) != signal.SIG_IGN:  # ignored already in the background of a script
             signal.signal(number, stop)
     try:
         app()
@@ -146,7 +146,7 @@ def ignore_signals() -> None:
 def stop(number: int, _: object) -> None:
     """Raise `Stopped` once; if the process still runs after `STOP_TIMEOUT`, end it."""
     ignore_signals()
-    sys.unraisablehook = lambda _: None  # if a destructor raises `Stopped`, Python only prints it
+    sys.unraisablehook = lambda _: None  # a `Stopped` that a destructor raises would only be printed
     threading.excepthook = lambda _: None  # threads may raise because their worker processes end
     start_new_thread(leave, (128 + number,))  # `threading.Thread` waits for a lock that this thread may hold
     raise Stopped(128 + number)

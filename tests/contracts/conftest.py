@@ -23,6 +23,7 @@ from davinci_forces.runner.runs import folders
 from davinci_forces.stages import STAGES, design
 from davinci_forces.study import Study, reading
 from tests import arm
+from tests.conftest import once
 
 TRUTH = {
     "theta": {name: dict(zip((t.name for t in arm.joint(name).terms), theta.tolist(), strict=True))
@@ -82,7 +83,21 @@ def sensed() -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory) -> Lab:
-    folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
+    """The study; it is analysed once a run of the tests, and not to be changed."""
+    folder = once(tmp_path_factory, "contracts", analyse) / "raw" / "arm"
+    study = study_in(folder)
+    its_folders = folders(folder, None, None)
+    return Lab(study, its_folders, Plan(study, Ledger(its_folders)))
+
+
+def study_in(folder: Path) -> Study:
+    """The study of a folder with the robot of these tests, and with its ground truth."""
+    return replace(reading.read(folder), robot=robot(), truth=TRUTH)
+
+
+def analyse(home: Path) -> None:
+    """Write the study, and run every stage but the report."""
+    folder = arm.write_study(home / "raw" / "arm")
     arm.write_csv(folder / "again.csv", [arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=2)])
     hung = arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=3, external=np.cos)
     arm.write_csv(folder / "hung.csv", [hung])
@@ -96,14 +111,12 @@ def lab(tmp_path_factory) -> Lab:
         file.write(arm.log_table("pitch", "pitch.csv", "identification", ["hand_pitch"]))
         file.write(arm.log_table("tip", "tip.csv", "contact", ALL, "contact = [[4.0, 8.0]]"))
         file.write("".join(f'{name} = "{name}"\n' for name in sensed()))
-    study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
-    runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))
+    runner = Runner(study_in(folder), folders(folder, None, None), Console(lambda line: None, said.append))
     with pytest.MonkeyPatch.context() as shorter:
         shorten(shorter)
         good = runner.run(STAGES)
     assert good, "\n".join(said)
-    return Lab(study, runner.folders, Plan(study, Ledger(runner.folders)))
 
 
 def shorten(patch: pytest.MonkeyPatch) -> None:

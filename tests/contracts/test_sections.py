@@ -234,8 +234,8 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
     assert said == (
         "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
-        "hand pitch; on an unseen path the model errs by 30 % on the instrument slide, too much to be believed; the "
-        "95 % bands are right or too wide."
+        "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
+        "slide, too much to be believed; no 95 % band is too narrow."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))

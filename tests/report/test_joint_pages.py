@@ -61,7 +61,7 @@ def test_the_residual_is_that_of_the_model_averaged_over_the_periods(analysed):
 
 def test_the_plain_fit_stands_beside_and_advice_does_not_propose_what_was_tried(page):
     main, _, beside = page.partition(f'id="all-fits-{JOINT}"')
-    assert "Compared with the joint by itself" in main
+    assert "Compared with the plain model (this joint alone, by least squares (LSE))" in main
     assert "Worth trying" not in main
     assert f"fit.{JOINT}.independent.lse.inertia" in beside
 
@@ -75,5 +75,5 @@ def test_what_the_model_gains_is_the_error_of_its_worst_log_that_was_not_fitted(
     logs = set(predicted[predicted["role"] != "identification"]["log"])
     errors = {log: results[f"predict.{log}.{JOINT}.chosen.relative_error"] for log in logs}
     worst = max(errors, key=lambda log: errors[log])
-    assert f"In {worst}, its worst log" in page
+    assert f"its relative error (noise included) is largest in {worst}" in page
     assert f"{errors[worst]:.3g}" in page

@@ -181,7 +181,7 @@ def test_a_negative_mass_within_its_error_of_zero_is_not_impossible():
 def test_estimates_against_truth_pass_as_95_percent_intervals_do_and_can_fail():
     """Three of five within four standard errors would pass; of 14, three beyond two standard errors are too many."""
     right = [0.1, 0.3, 0.5, 0.6, 0.8, 0.9, 1.1, 1.2, 1.3, 1.6, 1.9, 0.2, 0.7, 2.1]
-    assert truth_level(right) == ("good", "8 within 1, 13 within 2, 14 within 4")
+    assert truth_level(right) == ("good", "8 within 1, 13 within 2, 14 within 4 standard errors")
     beyond = [*right[:10], 2.5, 3.0, 3.3, 3.9]
     assert truth_level(beyond)[0] == "bad"
     assert truth_level([*right[:-1], 6.0])[0] == "bad"
@@ -200,5 +200,5 @@ def test_the_table_of_thresholds_says_what_the_verdicts_do():
 
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
-    assert "bands are right" not in verdict_sentence(None, [unjudged])
-    assert "bands are right" in verdict_sentence(None, [replace(unjudged, space=free_space(coverage=0.95))])
+    assert "no 95 % band is too narrow" not in verdict_sentence(None, [unjudged])
+    assert "no 95 % band is too narrow" in verdict_sentence(None, [replace(unjudged, space=free_space(coverage=0.95))])

@@ -14,8 +14,8 @@ from davinci_forces.maths.excitation.fourier import (
     instants,
     motion,
     observation,
+    qr_factor,
     ranges,
-    triangle,
 )
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, shrink_into_limits
 from davinci_forces.maths.models.bias import bias
@@ -95,7 +95,7 @@ def test_columns_that_depend_on_each_other_are_worth_nothing(criterion):
 @pytest.mark.parametrize("samples", [4, 2000, 2001, 2003, 6000, 1_000_001])
 def test_the_triangle_of_many_samples_is_that_of_all_at_once(samples):
     F = np.random.default_rng(0).normal(size=(2, samples, 4)) * (1.0, 1e-3, 1e5, 1.0)
-    R = triangle(F)
+    R = qr_factor(F)
     assert R.shape == (2, 4, 4)
     scale = np.linalg.norm(F, axis=1)
     expected = np.swapaxes(F, 1, 2) @ F / (scale[:, None] * scale[:, :, None])

@@ -1,7 +1,8 @@
 """Compare the numbers of two reports: which changed, which were added and which were removed.
 
-A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). Without a standard error in either report, it has
-changed if the relative difference exceeds 1e-9. A number with another unit has changed, too. The exit code is always 0.
+A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If neither report has a standard error, it
+has changed if the relative difference exceeds 1e-9. A number with another unit has changed, too.
+The exit code is always 0.
 """
 
 import json

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
+    robot: Annotated[str, typer.Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
     joint: Annotated[str, typer.Argument(help="A joint of the robot, or `all` to move all joints together.")],
     evaluate: Annotated[str | None, typer.Option(help="Evaluate these coefficients: a0,a1,b1,a2,b2,...")] = None,
     period: Annotated[
@@ -26,22 +26,26 @@ def run(
     harmonics: Annotated[int | None, typer.Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
     criterion: Annotated[
         str,
-        typer.Option(help="Minimise -log10 det(F'F) (`determinant`) or log10 cond(F) (`condition`) of regressor F."),
+        typer.Option(help="Minimise, of regressor F: `determinant` is -log10 det(F'F), `condition` is log10 cond(F)."),
     ] = "determinant",
     q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
     dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
     ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
     noise: Annotated[
-        str | None, typer.Option(help="Noise of the efforts (std), one or one a joint: print the expected errors.")
+        str | None,
+        typer.Option(help="Standard deviation of the effort noise, or one for each joint; prints the expected errors."),
     ] = None,
     floor: Annotated[
         float | None, typer.Option(help="With JOINT `all`: no moving frame goes below this z [m], in base axes.")
     ] = None,
     box: Annotated[
-        list[str] | None, typer.Option(help="With JOINT `all`: no frame enters it: x,y,z,x,y,z [m]. May be repeated.")
+        list[str] | None,
+        typer.Option(
+            help="With JOINT `all`: a box that no frame may enter, by two corners x,y,z,x,y,z [m]. Repeatable."
+        ),
     ] = None,
     starts: Annotated[
-        int | None, typer.Option(min=1, help="Starts of the search; default 24, or 2 if JOINT is `all`.")
+        int | None, typer.Option(min=1, help="Starting points of the search; default 24, or 2 if JOINT is `all`.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random starting points.")] = 0,
     samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,

@@ -1,6 +1,7 @@
 """Export the identified model for an arm's controller, with its errors and its range of validity.
 
-Research use, not a medical device: try at reduced effort with the stop in hand. Nothing here connects to a robot.
+Research use, not a medical device: try it at reduced torque, with the emergency stop in hand. Nothing here
+connects to a robot.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Simulate haptic feedback from tissue through the arm: the forces that a hand feels, and its stability margins."""
+"""Simulate haptic feedback through arm, controller and filter from a scenario: felt forces and stability margins."""
 
 import json
 from pathlib import Path

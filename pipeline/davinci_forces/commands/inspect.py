@@ -21,7 +21,7 @@ MAX_REPEATED_OR_JITTER = 0.1  # share of rows, and of the sampling time, above w
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="A log, of any format that `guide formats` lists.")],
+    file: Annotated[Path, typer.Argument(help="A log; `davinci-forces guide formats` lists the formats.")],
     head: Annotated[int, typer.Option(min=0, help="Number of rows to show.")] = 5,
     as_json: Annotated[bool, typer.Option("--json", help="Print the description as JSON.")] = False,
     dtype: Annotated[str | None, typer.Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,

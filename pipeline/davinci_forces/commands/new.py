@@ -16,7 +16,7 @@ def run(
     files: Annotated[list[Path], typer.Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
     robot: Annotated[
         str,
-        typer.Option(help="A listed robot, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
+        typer.Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
     ] = "",
     study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of the first log's.")] = None,
     show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,

@@ -17,7 +17,7 @@ MAX_DEFAULT_COORDINATES = 6  # of the zero pose of an arm with a wrist: the arm 
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
+    robot: Annotated[str, typer.Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
     at: Annotated[
         str | None, typer.Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
     ] = None,

@@ -41,7 +41,7 @@ def estimate(problem: Regression) -> Estimate:
 def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
     """Repeat weighted least squares until the fitted effort changes less than `TOLERANCE_HUBER`."""
     theta, root = R.theta, np.sqrt(weight)
-    tolerance = TOLERANCE_HUBER * np.sqrt(float(R.y @ R.y) + R.squares)
+    tolerance = TOLERANCE_HUBER * np.sqrt(float(R.y @ R.y) + R.min_squares)
     for _ in range(MAX_STEPS_HUBER):
         residual = root * (problem.tau - problem.Phi @ theta)
         deviation = MAD_TO_STD * float(np.median(np.abs(residual[weight > 0])))

@@ -31,7 +31,7 @@ def fit_with_prior(R: Triangle, guess: Array, K: int) -> Array:
     along = A.T @ (R.y - R.U @ (guess * R.scale))
     strength = STRENGTHS * float(size @ size)
     share = 1.0 + size**2 / strength[:, None]
-    squares = (along**2 / share).sum(axis=1) + R.squares
+    squares = (along**2 / share).sum(axis=1) + R.min_squares
     cost = K * np.log(np.maximum(squares, np.finfo(float).tiny)) + np.log(share).sum(axis=1)
     best = strength[int(cost.argmin())]
     return np.asarray(guess + d * (B.T @ (size / (size**2 + best) * along)))

@@ -139,7 +139,7 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
     if np.ptp(problem.tau) == 0:
         raise NotIdentifiable("the effort is constant: check its channel")
     R = triangle(problem.Phi, problem.tau, weight)
-    if not np.isfinite(R.squares):
+    if not np.isfinite(R.min_squares):
         columns = {"weight": np.where(weight >= 0, weight, np.nan), "effort": problem.tau, "motion": problem.Phi.sum(1)}
         name, row = next((name, np.argmin(np.isfinite(x))) for name, x in columns.items() if not np.isfinite(x).all())
         sample = f"sample {row + 1} of {len(problem.tau)}"

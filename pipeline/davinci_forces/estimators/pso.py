@@ -34,7 +34,7 @@ def estimate(problem: Regression) -> Estimate:
 def box_around(R: Triangle, problem: Regression) -> Box:
     """Return a box around least squares that contains the best parameters with the known signs."""
     K, p = int((problem.periods > 0).sum()), len(R.y)
-    std = np.sqrt(R.squares / (K - p) * (np.linalg.inv(R.U) ** 2).sum(axis=1)) / R.scale
+    std = np.sqrt(R.min_squares / (K - p) * (np.linalg.inv(R.U) ** 2).sum(axis=1)) / R.scale
     theta, positive = R.theta, problem.known.signs(p)
     std = np.maximum(std, np.finfo(float).eps * np.abs(theta))  # data without noise have no error
     missing = np.max(-theta[positive] / std[positive], initial=0.0)
@@ -48,7 +48,7 @@ def run_search(R: Triangle, box: Box, problem: Regression, manner: Manner) -> Se
     """Run a search, and compare it with least squares under the known signs."""
     result = search(R, box, SEED, manner)
     total = float(problem.periods.sum())
-    least = R.squares + float(R.excess(solve_bounded(R, problem.known.signs(len(R.y)))))
+    least = R.min_squares + float(R.excess(solve_bounded(R, problem.known.signs(len(R.y)))))
     return Search(
         walls=manner.name,
         seed=SEED,

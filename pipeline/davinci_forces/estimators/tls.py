@@ -74,10 +74,10 @@ def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
     variance, axes = np.linalg.eigh(C)
     noise = Noise(axes, np.where(variance > EXACT * variance[-1], variance, 0.0))
     theta = R.theta * R.scale
-    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y + R.squares))
+    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y + R.min_squares))
     v = 0.0
     for _ in range(MAX_STEPS_TLS):
-        squares = R.squares + float(((R.U @ theta - R.y) ** 2).sum())
+        squares = R.min_squares + float(((R.U @ theta - R.y) ** 2).sum())
         before, v = v, max(squares - float(theta @ C @ theta), floor)
         theta = fit_for_noise(R, noise, v)
         if abs(v - before) <= TOLERANCE_TLS * v:
@@ -89,7 +89,7 @@ def fit_for_noise(R: Triangle, noise: Noise, v: float) -> Array:
     """Fit the scaled parameters (p,) for noise v of the effort: QR of the exact columns, then SVD of the others."""
     p = len(R.y)
     M = np.zeros((p + 1, p + 1))
-    M[:p, :p], M[:p, p], M[p, p] = R.U @ noise.axes, R.y, np.sqrt(R.squares)
+    M[:p, :p], M[:p, p], M[p, p] = R.U @ noise.axes, R.y, np.sqrt(R.min_squares)
     (T,) = qr(M, mode="r")
     k = int((noise.variance == 0).sum())
     sizes = np.sqrt(np.r_[noise.variance[k:], v])

@@ -36,7 +36,7 @@ def estimate(problem: Regression) -> Estimate:
     weight = np.concatenate([M / pool_variance(var, M) for var, M in zip(*parts, strict=True)])
     R = factorise(problem, weight)
     degrees = int(np.count_nonzero(problem.periods)) - len(R.y)
-    if R.squares > degrees * (1.0 + max(MIN_EXCESS_SHARE, MIN_EXCESS_Z * np.sqrt(2.0 / degrees))):
+    if R.min_squares > degrees * (1.0 + max(MIN_EXCESS_SHARE, MIN_EXCESS_Z * np.sqrt(2.0 / degrees))):
         weight = add_model_error(weight, problem.tau - problem.Phi @ R.theta, degrees)
         R = factorise(problem, weight)
     return Estimate(R.theta, lambda: standard_errors(problem, weight, R, R.theta))

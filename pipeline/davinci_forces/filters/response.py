@@ -1,7 +1,8 @@
 """The response of a filter to a push, and the smallest random walk q_tau with which the filter follows a push.
 
-The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, at most the `delay` of
-the settings late.
+The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, and peaks no later than
+the setting `delay` after the push.  In this module `q_tau` is the random walk per sample, and `walk` is the random walk
+per square root of a second.
 """
 
 from collections.abc import Sequence
@@ -95,14 +96,15 @@ def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name:
     0, too, the smallest walk with which this filter follows a push within the joint's `delay` is used.
     """
     walk = walk or joint.q_tau
-    noise = NoiseModel(tuned.r_q, tuned.r_dq, 0.0, tuned.r_tau * T_s / tuned.inertia, walk * T_s**0.5)
+    q_dq = tuned.r_tau * T_s / tuned.inertia
+    noise = NoiseModel(r_q=tuned.r_q, r_dq=tuned.r_dq, q_q=0.0, q_dq=q_dq, q_tau=walk * T_s**0.5)
     return noise if walk else noise._replace(
         q_tau=smallest_q_tau(tracker(name), tuned.inertia, tuned.viscous, T_s, noise, tuned.delay)
     )  # fmt: skip
 
 
-def lag(recordings: Sequence[FilterInput], smooth: Array, noise: NoiseModel) -> Array:
-    """Return the error (N,) that the filter's lag makes in recordings, computed from their smoothed effort (N,).
+def lag_error(recordings: Sequence[FilterInput], smoothed: Array, noise: NoiseModel) -> Array:
+    """Return the error (N,) that the filter's lag makes in recordings, computed from the smoothed external effort (N,).
 
     The error is the smoothed effort minus the filter's response to it.  That response is computed for a joint at rest,
     where the filter is linear: position and velocity stay 0.
@@ -110,6 +112,6 @@ def lag(recordings: Sequence[FilterInput], smooth: Array, noise: NoiseModel) -> 
     first = np.cumsum([len(recording.q) for recording in recordings])[:-1]
     inputs_at_rest = (
         stationary_joint(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.initial_std)
-        for part, tau_ext in zip(recordings, np.split(smooth, first), strict=True)
+        for part, tau_ext in zip(recordings, np.split(smoothed, first), strict=True)
     )
-    return np.asarray(smooth - np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest]))
+    return np.asarray(smoothed - np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest]))

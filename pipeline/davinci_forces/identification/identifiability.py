@@ -34,9 +34,10 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
 
 
 def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]:
-    """Describe parameters that noise alone may cause, with an upper bound of their effort.
+    """Describe parameters whose estimates noise alone could explain, with an upper bound of their effort.
 
-    The error due to the model does not count: the data determine such a parameter, though other terms would change it.
+    The test takes the error due to noise alone: the data determine a parameter that passes it, though other terms of
+    the model may change its value.  The upper bound takes both parts of the error.
     """
     noise_std = estimate.standard_errors.noise
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
@@ -51,16 +52,16 @@ def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]
 
 def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
     """Recommend what to record next; "" without problems."""
-    return f"{better_motion(robot, joint)} designs a motion that excites these parameters best" if problems else ""
+    return f"{excite_command(robot, joint)} designs a motion that excites these parameters best" if problems else ""
 
 
-def better_motion(robot: Robot, joint: Joint) -> str:
+def excite_command(robot: Robot, joint: Joint) -> str:
     """Return the command that designs a motion of a joint; an unlisted robot has a file in the study's folder."""
     name = robot.file or (robot.name if robot.name in ROBOTS else f"{robot.name}.toml")
     return f"`davinci-forces excite {name} {joint.name}`"
 
 
-def inertia_at_fault(
+def why_not_positive(
     robot: Robot, joint: Joint, estimate: Estimate, conditioning: least_squares.ColumnAnalysis, others: Sequence[str]
 ) -> str:
     """Explain from its fit why an inertia is not positive; `others` are joints that move in the same logs.
@@ -72,11 +73,11 @@ def inertia_at_fault(
     value = float(inertia_coefficients @ estimate.theta)
     std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, inertia_coefficients)
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
-    omitted = f", and this model omits that {joints_move(others)} in the same logs" if others else ""
+    omitted = f"; this model leaves out the effects of {join_names(others)} in the same logs" if others else ""
     if value > -MIN_Z * std:
-        text = f"{inertia} may be positive, because the motion hardly excites it{omitted}"
+        text = f"{inertia} cannot be distinguished from 0, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
-        return f"{text}; record the joint {by_itself}accelerating more: {better_motion(robot, joint)}"
+        return f"{text}; record the joint {by_itself}accelerating more: {excite_command(robot, joint)}"
     friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
     negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and negative_friction.sum() * 2 >= friction.sum():
@@ -84,7 +85,7 @@ def inertia_at_fault(
         return f"{text}; correct the `sign` of the effort or of the position"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
-        return f"{text}{omitted}; record the joint by itself: {better_motion(robot, joint)}"
+        return f"{text}{omitted}; record the joint by itself: {excite_command(robot, joint)}"
     causes = "effort and motion may be logged at different times, or friction acts as a spring at reversals"
     return f"{text}: {causes}"
 

@@ -34,7 +34,10 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Append samples: to the last part if `start` [s] is None or `due`, the time after it; else as a new part."""
+        """Append samples, which begin at `start` [s]; None means directly after the last sample.
+
+        A new part begins if the samples do not follow the last one directly, or if their sampling time is another.
+        """
         due = self.due
         continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not continues or step != self.step[-1]:
@@ -104,7 +107,8 @@ class Sampling:
     step: float  # [s] sampling time
 
     def is_like(self, sampling: "Sampling", has_x_columns: bool) -> bool:
-        """Whether the header says that both were sampled together; X0 and step are ignored if the file has times X."""
+        """Whether the header says that both were sampled together; X0 and step do not count if the file has X "
+        "columns."""
         if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not has_x_columns):
             return False
         start, other_start = self.start, sampling.start
@@ -124,7 +128,7 @@ class OwnClock:
 
 
 def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has_x_columns: bool) -> list[list[str]]:
-    """Split groups of channels whose clocks differ according to a further header of the file."""
+    """Split each group whose channels have different clocks by a further header; add channels that are in no group."""
     split: list[list[str]] = []
     for group in groups:
         parts: list[list[str]] = []
@@ -147,7 +151,7 @@ def _add_to_group(groups: list[list[str]], name: str, sampled: dict[str, Samplin
 
 
 def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
-    """Group columns that have equal values in all rows; missing values are equal to each other."""
+    """Group columns with equal values in all rows, as columns of times of one clock; missing values are equal."""
     groups = [[*names]]
     for block in blocks:
         split: list[list[str]] = []

@@ -13,7 +13,7 @@ class Links(RobotRecord):
     UNKNOWN = ("alpha", "a", "d", "offset", "mass")  # NaN for a link without these parameters
     ROWS = "link"
 
-    worst_condition: float
+    worst_condition: float  # largest condition number of the tip's Jacobian in the workspace
     link: Labels
     parent: Labels
     alpha: Column
@@ -92,7 +92,7 @@ class Lyapunov(Record):
     V: Column
 
     def published(self) -> Iterator[Published]:
-        """The initial value, and the largest rise between two steps."""
+        """The initial value, and the largest rise from one sample to the next."""
         yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
 
 
@@ -105,9 +105,9 @@ class Excitation(JointRecord):
     source: str
     period: float
     objective: float  # -log10 det(F'F), the criterion "determinant"
-    condition: float
+    condition: float  # condition number of the regressor F, not its logarithm
     coefficients: tuple[float, ...]
-    excess_q: float
+    excess_q: float  # [rad or m] beyond the limits of position; 0 within them; so for dq and ddq
     excess_dq: float
     excess_ddq: float
     t: Column

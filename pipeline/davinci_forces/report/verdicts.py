@@ -158,7 +158,7 @@ def truth_level(errors: Sequence[float]) -> tuple[Level, str]:
     """
     n = len(errors)
     counts = {width: sum(error <= width for error in errors) for width in WITHIN}
-    words = ", ".join(f"{k} within {width}" for width, k in counts.items())
+    words = ", ".join(f"{k} within {width}" for width, k in counts.items()) + " standard errors"
     if any(bdtr(counts[width], n, WITHIN[width]) < UNLIKELY for width in (2, 4)):
         return "bad", f"{words}; the stated errors are too small"
     too_wide = 1.0 - bdtr(counts[1] - 1, n, WITHIN[1]) < UNLIKELY
@@ -223,7 +223,7 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(DETECTED)}", f"at most {percent(DETECTABLE)}", "beyond"),
         ("External effort of a joint, if no `effort` is stated", "model error over the root mean square of the effort",
          f"at most {percent(GOOD)}, on a path of which more than {percent(MIN_NEW_PATH)} was not fitted",
-         f"at most {percent(CAUTION)}, or the same path, or at rest for most of the run", "beyond"),
+         f"at most {percent(CAUTION)}, or tested only on the fitted path or mostly at rest", "beyond"),
         ("95 % band of the external effort", "coverage: share of free-space samples in the band",
          f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
@@ -234,7 +234,8 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval, from joints that agree",
          "beyond, or the joints contradict each other", "–"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
-        ("Estimates of a simulated study", "probability that so few lie within 2 standard errors, or 4, of the truth",
+        ("Estimates of a simulated study",
+         "probability, if the errors are right, that as few or fewer lie within 2 (and within 4) of them",
          f"at least {percent(UNLIKELY)}", "–", "below"),
         ("White noise", "p-value of the Ljung-Box test over 20 lags", "above 1 %", "–", "–"),
         ("Innovations of the filter", "p-values of this test and of the cumulative periodogram, both signals",

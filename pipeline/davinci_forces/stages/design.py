@@ -1,4 +1,5 @@
-"""Simulate the robot before anything is recorded: its chain, its controllers and its excitation trajectories."""
+"""Compute what needs no logs: the robot's geometry and workspace, simulated controllers, and excitation "
+"trajectories."""
 
 from collections.abc import Iterator
 from itertools import product

@@ -18,14 +18,14 @@ ZERO_ALLOWED = ("skip", "harmonics", "q_tau")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 TARE_ROLES = ("validation", "identification")  # roles of logs in which nothing touches the arm
 MAX_LISTED = 100  # names of logs that one message lists
-MAX_POSITION = 3.0  # [m] distance from the remote centre; a larger position is probably in another unit
+MAX_POSITION = 3.0  # [m] largest coordinate of a position; a larger one is probably in another unit
 WINDOWS = "a list of [start, end] in seconds, with 0 <= start < end"
-SEVERAL = ("files", "join")  # keys of a log in several files: `files` follow in time, `join` has other channels in each
+SEVERAL = ("files", "join")  # several files of a log: one after the other in time, or side by side in channels
 ALL = "all"  # value of `contact` in a tissue log whose samples are all in contact
 
 
-def optional(table: TomlTable, key: str) -> float | None:
-    """Read a positive number that may be missing."""
+def optional_number(table: TomlTable, key: str) -> float | None:
+    """Read a number that may be missing; it is positive, or 0 for keys in `ZERO_ALLOWED`."""
     return check_positive(table, key, table.number(key)) if key in table else None
 
 
@@ -73,9 +73,9 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         role=table.text("role", choices=ROLES),
         channels=Channels(table, robot).read(),
         join="join" in table,
-        period=optional(table, "period"),
-        rate=optional(table, "rate"),
-        skip=optional(table, "skip") or 0.0,
+        period=optional_number(table, "period"),
+        rate=optional_number(table, "rate"),
+        skip=optional_number(table, "skip") or 0.0,
         until=_end(table),
         contact=_windows(table, "contact"),
         free=_windows(table, "free"),
@@ -123,7 +123,7 @@ def _is_name(value: object) -> bool:
 
 def _end(table: TomlTable) -> float | None:
     """Read the end of the log [s]; report a problem if the end is not after the skipped start."""
-    until = optional(table, "until")
+    until = optional_number(table, "until")
     skip = table.values.get("skip", 0.0)
     if until is not None and isinstance(skip, int | float) and 0 < until <= skip:
         end = f"until = {until:g} s leaves no samples after skip = {skip:g} s"
@@ -192,7 +192,7 @@ def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
     moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
     position = weight.numbers("position", count=3, expected="[x, y, z] in metres")
     if position and max(map(abs, position)) > MAX_POSITION:
-        must = f"position must lie within {MAX_POSITION:g} m of the remote centre"
+        must = f"each coordinate of position must lie within {MAX_POSITION:g} m"
         weight.problem(f"{must}, not {list(position)}; it is in metres", "position")
     weight.close()  # reports unknown keys
     return AttachedMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

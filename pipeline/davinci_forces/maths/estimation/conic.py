@@ -75,7 +75,7 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
     """
     if not mechanism.has_bodies and (R.theta[mechanism.positive] >= 0).all():
         return ConsistentParameters(R.theta, R.theta, 0.0, 0.0)
-    F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.squares))
+    F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.min_squares))
     cones = scale_unknowns(F, mechanism)
     z, gap = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
     x = np.asarray(cones.scale[:, cones.seen] @ z * size)

@@ -4,9 +4,10 @@
     theta = D^-1 U^-1 y,    cov(theta) ~ (Phi' W Phi)^-1,    U = A diag(singular_values) B'
 
 D holds the lengths of the weighted columns, so U has columns of unit length.  The triangular factor U contains all
-information of the data for least squares, with or without bounds.  Its singular values show which parameters the data
-determine one by one, and which only in combination.  A column of B with a small singular value is a combination of
-parameters that hardly changes the effort.
+information of the data for least squares, with or without bounds.  A small singular value means that its column of B is
+a combination of parameters that hardly changes the effort, so the data determine this combination badly.
+
+Numbers of equations in this package are those of the thesis.
 """
 
 from typing import NamedTuple
@@ -21,7 +22,7 @@ class Triangle(NamedTuple):
 
     U: Array  # (p, p) upper triangular
     y: Array  # (p,)
-    squares: float  # e^2, minimum of the weighted sum of squared residuals
+    min_squares: float  # e^2, minimum of the weighted sum of squared residuals
     scale: Array  # (p,) lengths of the weighted columns: the diagonal of D
 
     @property
@@ -60,7 +61,7 @@ def solve_bounded(factor: Triangle, positive: Booleans) -> Array:
 
 
 class ColumnAnalysis(NamedTuple):
-    """Correlations of p estimates, and the singular value decomposition of their scaled columns."""
+    """Correlations of p estimates, and the singular value decomposition of the regressor's scaled columns."""
 
     correlation: Array  # (p, p) of the estimates
     singular_values: Array  # (p,) of the columns scaled to unit length, the largest first

@@ -76,8 +76,8 @@ def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) ->
         window = history[start : start + ITERATIONS_DRAWN]
         kernels.fly(x, v, best, costs, *bounds, r, w, manner.cognitive, manner.social, manner.reflects, window)
         done = start + ITERATIONS_DRAWN
-        if done > PATIENCE and history[done - 1 - PATIENCE] - window[-1] <= CHANGE * (R.squares + window[-1]):
+        if done > PATIENCE and history[done - 1 - PATIENCE] - window[-1] <= CHANGE * (R.min_squares + window[-1]):
             break
     leader = best[int(costs.argmin()), :n]
-    history = history[:done] + R.squares
+    history = history[:done] + R.min_squares
     return SwarmOptimum(leader, box.lumping.theta(leader), float(history[-1]), history, 1)

@@ -3,7 +3,8 @@
 The coefficients of a series form one vector x = (a0, a1, b1, a2, b2, ...).  Position, velocity and acceleration are
 linear in x.  Section 6.3
 
-The criteria measure how well regressors F (..., K, p) determine their parameters; they are infinite without full rank.
+A criterion is smaller, the better a regressor F (..., K, p) determines its parameters; it is infinite
+without full rank.
 
 The run-in leads from a standstill into the trajectory along the same path, slowly at first:
 
@@ -27,7 +28,7 @@ Range = tuple[float, float]
 PERIOD_SAMPLES = 300  # K, of one period without its end point; this number reproduces Table 6.1
 # Number of entries of the largest matrix that is factored in one piece: for a larger one, the library starts threads.
 # The matrices here are so small that threads make the search slower, up to 20 times on a busy machine.
-MAX_TRIANGLE_ENTRIES = 8000
+MAX_QR_ENTRIES = 8000
 RUN_IN_INSTANTS = 10_000  # instants of a run-in at which the limits are checked
 LIMIT_MARGIN = 1e-5  # margin, as a share of a limit, for peaks between the checked instants
 
@@ -82,9 +83,8 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
     times = []
     for derivative in (velocity, 1j * k * velocity, -(k**2) * velocity):
         size = np.abs(derivative)
-        derivative = np.where(
-            size > 1e-14 * size.max(), derivative, 0.0
-        )  # a coefficient of rounding errors would spoil the roots
+        # A coefficient that is only rounding error would spoil the roots.
+        derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)
         roots = np.roots(np.concatenate([derivative[::-1], [0.0], derivative.conj()]))
         angles = np.concatenate([[0.0], np.angle(roots) % (2 * np.pi)])
         times.append(angles * (series.period / (2 * np.pi)))
@@ -103,9 +103,9 @@ def observation(terms: Sequence[Term], series: Fourier, samples: int = PERIOD_SA
     return regressor(terms, *motion(series, instants(series.period, samples)))
 
 
-def _columns(constant: float, sines: Array, cosines: Array) -> Array:
-    pairs = np.stack([sines, cosines], axis=2).reshape(len(sines), -1)
-    return np.column_stack([np.full(len(sines), constant), pairs])
+def _columns(constant: float, of_a: Array, of_b: Array) -> Array:
+    pairs = np.stack([of_a, of_b], axis=2).reshape(len(of_a), -1)
+    return np.column_stack([np.full(len(of_a), constant), pairs])
 
 
 Criterion = Callable[[Array], Array]
@@ -113,24 +113,24 @@ Criterion = Callable[[Array], Array]
 
 def determinant(F: Array) -> Array:
     """-log10 det(F^T F) for each of the leading indices of F, shape (...).  (6.20)"""
-    diagonal = np.abs(np.diagonal(triangle(F), axis1=-2, axis2=-1))
+    diagonal = np.abs(np.diagonal(qr_factor(F), axis1=-2, axis2=-1))
     return _where_full_rank(F, diagonal.min(-1), diagonal.max(-1), lambda: -2 * np.log10(diagonal).sum(-1))
 
 
 def condition(F: Array) -> Array:
     """log10 of the condition number for each of the leading indices of F, shape (...)."""
-    s: Array = np.asarray(np.linalg.svd(triangle(F), compute_uv=False), np.float64)
+    s: Array = np.asarray(np.linalg.svd(qr_factor(F), compute_uv=False), np.float64)
     return _where_full_rank(F, s[..., -1], s[..., 0], lambda: np.log10(s[..., 0] / s[..., -1]))
 
 
-def triangle(F: Array) -> Array:
+def qr_factor(F: Array) -> Array:
     """The factor R (..., p, p) of F = Q R; for many samples, blocks of F are factored, then the factors together."""
     samples, parameters = F.shape[-2:]
-    rows = max(2 * parameters, MAX_TRIANGLE_ENTRIES // parameters)
+    rows = max(2 * parameters, MAX_QR_ENTRIES // parameters)
     if samples <= rows:
         return np.asarray(np.linalg.qr(F, mode="r"))
     blocks = [np.linalg.qr(F[..., i : i + rows, :], mode="r") for i in range(0, samples, rows)]
-    return triangle(np.concatenate(blocks, axis=-2))
+    return qr_factor(np.concatenate(blocks, axis=-2))
 
 
 def _where_full_rank(F: Array, smallest: Array, largest: Array, value: Callable[[], Array]) -> Array:
@@ -144,8 +144,8 @@ CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condi
 
 
 def determinant_gradient(F: Array) -> tuple[float, Array]:
-    """-ln det(F^T F) of F (K, p), and its gradient -2 F (F^T F)^-1 by the entries of F."""
-    R = triangle(F)
+    """-ln det(F^T F) of F (K, p), and its gradient -2 F (F^T F)^-1 with respect to the entries of F."""
+    R = qr_factor(F)
     with np.errstate(divide="ignore"):
         value = -2 * float(np.log(np.abs(np.diagonal(R))).sum())
     inverse = np.linalg.inv(R) if np.isfinite(value) else np.full_like(R, np.inf)
@@ -153,13 +153,14 @@ def determinant_gradient(F: Array) -> tuple[float, Array]:
 
 
 def condition_gradient(F: Array) -> tuple[float, Array]:
-    """The natural logarithm of the condition number of F (K, p), and its gradient by the entries of F."""
-    s, V = np.linalg.svd(triangle(F))[1:]
+    """The natural logarithm of the condition number of F (K, p), and its gradient with respect to the entries of F."""
+    s, V = np.linalg.svd(qr_factor(F))[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         gradients = (np.outer(F @ v, v) / size**2 for v, size in ((V[0], s[0]), (V[-1], s[-1])))
         return float(np.log(s[0] / s[-1])), np.asarray(np.subtract(*gradients))
 
 
+# Minima are the same for natural logarithms, whose gradients are simpler.
 GRADIENTS = {"determinant": determinant_gradient, "condition": condition_gradient}
 
 
@@ -169,7 +170,7 @@ def expected_std(F: Array, noise: Array) -> Array:
     They are the roots of the diagonal of (F^T W F)^-1, with W = diag(1 / noise^2), and infinite without full rank.
     (6.31)
     """
-    R = triangle(F / noise[:, None])
+    R = qr_factor(F / noise[:, None])
     if not np.isfinite(condition(R)):
         return np.full(F.shape[1], np.inf)
     return np.asarray(np.linalg.norm(np.linalg.inv(R), axis=1))
@@ -185,16 +186,16 @@ def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Ar
     return q, dsigma * dq, dsigma**2 * ddq + ddsigma * dq
 
 
-Holds = Callable[[Array, Array, Array], bool]  # whether limits that couple the joints hold along a motion (K, n)
+KeepsLimits = Callable[[Array, Array, Array], bool]  # of a motion (K, n), for limits that couple the joints
 
 
 def shortest_run_in(
-    series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array, hold: Holds | None = None
+    series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array, keeps_limits: KeepsLimits | None = None
 ) -> float | None:
     """The first of `durations` [s] for which the run-ins of all series keep their limits of acceleration, or None.
 
-    If a series itself exceeds the limits, its run-in may reach the accelerations of the series.  `hold` may set limits
-    to the motion of all series together.
+    If a series itself exceeds the limits, its run-in may reach the accelerations of the series.  `keeps_limits`
+    may set limits to the motion of all series together.
     """
     bounds = []
     for joint_series, (low, high) in zip(series, accelerations, strict=True):
@@ -205,6 +206,6 @@ def shortest_run_in(
         q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(run_in(s, t, duration) for s in series), strict=True))
         ranges_of_ddq = zip(bounds, ddq.min(axis=0), ddq.max(axis=0), strict=True)
         within_limits = all(low <= least and largest <= high for (low, high), least, largest in ranges_of_ddq)
-        if within_limits and (hold is None or hold(q, dq, ddq)):
+        if within_limits and (keeps_limits is None or keeps_limits(q, dq, ddq)):
             return float(duration)
     return None

@@ -4,10 +4,10 @@ Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5
 the equations of one link.  Where several links share a coordinate, its effort is the sum of theirs.
 
 The same source runs on numpy arrays and in compiled loops (`kernels`).  The last axis of every array has S samples.
-`for s in samples` runs over numbers in compiled code (`range(S)`), and once in numpy, where s is a slice of all.
-`joints` (n + 1, 5, S) has cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no
-coordinate moves.  `scratch` (bodies, numbers, S) has the intermediate results of every body, the base first.  The
-caller sets it to 0 before its first use.
+In compiled code `samples` is `range(S)`; in numpy it has one element, a slice of all samples.  `joints` (n + 1, 5, S)
+has cos q, sin q, q, dq, ddq of each coordinate.  Its last row is 0, for links that no coordinate moves: they count as
+sliding by 0, so cos q and sin q are not used.  `scratch` (bodies, numbers, S) has the intermediate results of every
+body: the base is body 0, link i is body i + 1.  The caller sets it to 0 before its first use.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
 
 Samples = Iterable[Any]
-FIRST_MOMENT = 13  # index in a row of `tree.rows` of the first moment (3 numbers), which the inertia (6) follows
+FIRST_MOMENT = 13  # index of the first moment (3 numbers) in a row of `tree.rows`; 6 numbers of the inertia come next
 
 
 def vector(body: Any, first: int, s: Any) -> Vector:

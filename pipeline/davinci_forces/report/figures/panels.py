@@ -117,7 +117,7 @@ def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
     """
     columns, width = figure.columns, PAGE_WIDTH / figure.columns
     panels = [_with_axes(figure, place, width) for place in range(len(figure.panels))]
-    numbers = max(panel.y.letters for panel in panels) * DIGIT
+    numbers = max(panel.y.characters for panel in panels) * DIGIT
     left = TICK + numbers + max(lines_of(panel.y.label) for panel in panels) * LINE_HEIGHT + 1
     wide = width - left - RIGHT
     panels = [_fitted(panel, width, wide) for panel in panels]

@@ -71,7 +71,7 @@ def draw_panel(panel: PlacedPanel, name: str) -> str:
 def numbers_within(axis: Axis) -> list[tuple[float, str]]:
     """The numbers of an axis, with their places as shares of its length."""
     shares = axis.share(axis.values).tolist()
-    return [(share, number) for share, number in zip(shares, axis.numbers, strict=True) if -1e-9 <= share <= 1 + 1e-9]
+    return [(share, number) for share, number in zip(shares, axis.texts, strict=True) if -1e-9 <= share <= 1 + 1e-9]
 
 
 def draw_grid(panel: PlacedPanel, frame: Frame) -> str:

@@ -17,14 +17,14 @@ ROUNDING = 1e-9  # of a step
 
 @dataclass(frozen=True)
 class Axis:
-    """A range, logarithmic if `log`, with numbers at `values`; `label` has the power of ten that they omit."""
+    """A range, logarithmic if `log`, with `texts` at `values`; `label` has the power of ten that the texts omit."""
 
     low: float
     high: float
     log: bool
     label: str
     values: tuple[float, ...] = ()
-    numbers: tuple[str, ...] = ()
+    texts: tuple[str, ...] = ()
 
     def share(self, x: Array | Sequence[float]) -> Array:
         """The place of each value along the axis: 0 at its lower end, 1 at its upper end."""
@@ -34,7 +34,7 @@ class Axis:
             return np.log10(np.asarray(x, float) / self.low) / math.log10(self.high / self.low)
 
     def with_numbers(self, most: int, capacity: float = math.inf) -> "Axis":
-        """The axis with round numbers, at most `most` steps apart, so few that they do not touch.
+        """The axis with round numbers in at most `most` intervals, and few enough that they do not touch.
 
         `capacity` is the length of the axis in characters.
         """
@@ -44,21 +44,21 @@ class Axis:
         scale = 10.0**exponent
         for intervals in range(most, 0, -1):
             values, step = round_values(self.low / scale, self.high / scale, intervals)
-            numbers = in_digits(values, step)
-            widest = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
+            texts = in_digits(values, step)
+            widest = 1 + max((len(text.replace(".", "")) for text in texts), default=0)  # a point is narrow
             if len(values) < 3 or widest <= capacity * step * scale / (self.high - self.low):
                 break
         places = tuple((values * scale).tolist())
-        return replace(self, label=with_power(self.label, exponent), values=places, numbers=numbers)
+        return replace(self, label=with_power(self.label, exponent), values=places, texts=texts)
 
     def with_dates(self, most: int) -> "Axis":
-        """The axis with dates at whole days, or times at round hours; it is in days since 1970."""
+        """The axis with dates at whole days, or times at round parts of a day; it is in days since 1970."""
         values, step = round_values(self.low, self.high, most)
         if step >= 1.0:
             values = np.unique(np.round(values))
         times = (np.datetime64("1970-01-01T00:00") + np.round(values * 1440).astype("timedelta64[m]")).tolist()
         form = "%m-%d\n%Y" if step >= 1.0 else "%H:%M\n%Y-%m-%d"
-        return replace(self, values=tuple(values.tolist()), numbers=tuple(time.strftime(form) for time in times))
+        return replace(self, values=tuple(values.tolist()), texts=tuple(time.strftime(form) for time in times))
 
     def _with_decades(self) -> "Axis":
         """Numbers at 1, 2 and 5 of each decade, or at powers of ten on a long axis."""
@@ -67,28 +67,28 @@ class Axis:
         if last - first < FEW_DECADES:
             values = [digit * 10.0**n for n in range(first - 1, last + 1) for digit in (1, 2, 5)]
             inside = tuple(value for value in values if low <= math.log10(value) <= high)
-            return replace(self, values=inside, numbers=tuple(f"{value:g}" for value in inside))
+            return replace(self, values=inside, texts=tuple(f"{value:g}" for value in inside))
         powers = range(first, last + 1, math.ceil((last - first) / FEW_DECADES))
-        numbers = tuple(f"10{str(n).translate(SUPERSCRIPTS)}" for n in powers)
-        return replace(self, values=tuple(10.0**n for n in powers), numbers=numbers)
+        texts = tuple(f"10{str(n).translate(SUPERSCRIPTS)}" for n in powers)
+        return replace(self, values=tuple(10.0**n for n in powers), texts=texts)
 
     def with_names(self, names: Sequence[str]) -> "Axis":
         """The axis with names at 0, 1, 2, ..."""
-        return replace(self, values=tuple(map(float, range(len(names)))), numbers=tuple(names))
+        return replace(self, values=tuple(map(float, range(len(names)))), texts=tuple(names))
 
     @property
-    def letters(self) -> int:
-        """Characters of its longest number."""
-        return max((len(line) for number in self.numbers for line in number.split("\n")), default=0)
+    def characters(self) -> int:
+        """Characters of its longest text."""
+        return max((len(line) for text in self.texts for line in text.split("\n")), default=0)
 
     @property
     def lines(self) -> int:
-        """Lines of its highest number."""
-        return max((number.count("\n") + 1 for number in self.numbers), default=1)
+        """Lines of its tallest text."""
+        return max((text.count("\n") + 1 for text in self.texts), default=1)
 
 
 def axis_over(columns: Iterable[Array], margins: tuple[float, float], log: bool, label: str) -> Axis:
-    """An axis over all finite values, and over `margins` as shares of their range below and above."""
+    """An axis over all finite values, widened below and above by `margins` as shares of their range."""
     values = np.concatenate([np.zeros(0), *columns])
     values = values[np.isfinite(values) & ((values > 0) | (not log))]
     low, high = (float(values.min()), float(values.max())) if len(values) else (1.0, 10.0) if log else (0.0, 1.0)
@@ -101,7 +101,7 @@ def axis_over(columns: Iterable[Array], margins: tuple[float, float], log: bool,
 
 
 def round_values(low: float, high: float, intervals: int) -> tuple[Array, float]:
-    """Multiples of a round step from low to high, in at most so many intervals, and the step."""
+    """Multiples of a round step from low to high in at most `intervals` intervals, and the step."""
     least = (high - low) / intervals
     base = 10.0 ** math.floor(math.log10(least))
     step = next(base * factor for factor in ROUND_STEPS if base * factor >= least * (1 - ROUNDING))

@@ -37,21 +37,22 @@ def blocks(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(
-            "A contact is measured on each joint that moves in the log, or on which one is found. The study states its "
-            "window, or it is the time in which the external effort, the smoother's, exceeds the alarm level. Free "
-            "motion crosses this level at most once in ten minutes. Each contact has an onset, a release, a peak (the "
-            "largest external effort), a mean and an impulse (effort times time). The standard error of each "
-            "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
-            "includes the smoother's standard deviation at that peak, and the height by which the smoother flattens "
-            "it; that of a mean also includes what the smoother spreads out of the window. A contact "
-            "is detected if its peak exceeds the joint's detection level: 99 % of the samples of the joint's worst run "
-            "in free space stay below this level."
+            "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is "
+            "found there. The window of a contact is stated in study.toml. Otherwise it is the time in which the "
+            "smoothed external effort exceeds the alarm level, which free motion crosses at most once in ten minutes. "
+            "Onset and release are the times at which the effort leaves zero and returns to it. Peak (the largest "
+            "external effort), mean and impulse (effort times time) are taken over the whole window. Their standard "
+            "errors are their spread over windows of the same length in free space. The standard error of a peak also "
+            "includes the smoother's standard deviation there, and the height by which smoothing flattens the peak. "
+            "The standard error of a mean also includes the effort that smoothing moves out of the window. The lower "
+            "detection level judges peaks: 99 % of the samples of the joint's worst run in free space stay below it."
         )
         yield peaks(contacts)
         yield Table(
-            "Contacts, log by log; the PDF has those of the largest peaks over detection level. Interval: 95 % of the "
-            "peak. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below the "
-            "alarm level; “not stated” for a contact that was found outside the study's windows.",
+            f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
+            "Interval: 95 % confidence interval of the peak. Verdict: whether the peak exceeds the detection level; "
+            "“peak only” if it does but stays below the alarm level; “found” for a contact outside the windows that "
+            "the study states.",
             ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict"),
             tuple(row for contact in contacts for row in rows(context, contact)),
             "contact-table",
@@ -61,7 +62,7 @@ def blocks(context: Context) -> Iterator[Block]:
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
         yield Table(
-            "Logs that were recorded, but not analysed for contact.",
+            "Joints of logs on which no contact was measured.",
             ("Log", "Joint", "Reason, and remedy"),
             unused,
             "not-analysed",
@@ -95,7 +96,7 @@ def interval(peak: Number | str) -> str:
 def verdict(contact: Contact, i: int) -> str:
     """Whether a contact is detected, or was found outside the windows that the study states."""
     if not contact.stated[i]:
-        return "not stated"
+        return "found"
     return ("detected" if contact.found[i] else "peak only") if contact.above[i] else "not detected"
 
 

@@ -42,13 +42,13 @@ def blocks(context: Context) -> Iterator[Block]:
     if not noises:
         return
     yield Prose(
-        "The filter assumes noise of position, velocity and effort. Its standard deviations maximise the likelihood of "
-        "the innovations (each measurement minus its prediction) in identification logs, where nothing touches the "
-        "robot. The external effort is modelled as a random walk. Identification logs cannot show how fast the "
-        "external effort may change: a filter tuned to them would miss pushes. So the random walk has the smallest "
-        "intensity with which the filter returns 90 % of the peak of a push (a half-sine of 1 s) at most "
-        f"{context.study.settings.delay:g} s late ([@filter-tuning]). A longer `delay` in [settings] lowers the "
-        "filter's noise."
+        "The filter assumes noise of position, velocity and effort. The standard deviations of this noise maximise the "
+        "likelihood of the innovations (each measurement minus its prediction) in identification logs, where nothing "
+        "touches the robot. The external effort is modelled as a random walk. Identification logs cannot show how fast "
+        "the external effort may change: a filter tuned to them would miss pushes. So a push decides, a half-sine of 1 "
+        "s. The random walk is the slowest with which the filter shows 90 % of the peak of this push, at most "
+        f"{context.study.settings.delay:g} s late ([@filter-tuning]). A longer `delay` in the settings of study.toml "
+        "lowers the filter's noise."
     )
     yield tuning(context, noises)
     worst = [track for noise in noises for track in worst_track(context, noise.joint)]
@@ -56,9 +56,10 @@ def blocks(context: Context) -> Iterator[Block]:
         yield Prose(
             "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
             "smoother's part comes from noise and random walk. The model's part is the model's error in free motion of "
-            "other logs, which were not fitted. Their sum is scaled, for each range of speed, so that 95 % of the "
-            "errors in this free motion lie within 1.96 standard deviations. The error of the offset of the day (a "
-            "constant effort that differs from day to day) is added if windows without contact determine this offset."
+            "other logs, which were not fitted. The root of the sum of their squares is scaled, for each range of "
+            "speed, so that 95 % of the errors in this free motion lie within 1.96 standard deviations. The offset of "
+            "the day (a constant effort that differs from day to day) may be estimated from windows without contact "
+            "and removed; then the error of this estimate is added."
         )
         yield budget(context, worst)
         yield cost_of_real_time(context, worst)
@@ -105,7 +106,7 @@ def budget(context: Context, tracks: list[Track]) -> Table:
         "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
         "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
         "Over logs: the mean coverage of all logs that were not fitted, with its standard error over logs (with "
-        "fewer than 3 logs, over blocks of time), and the mean half-width of their bands.",
+        "fewer than 3 logs, over blocks of time). Half-width: the mean half-width of the bands of these logs.",
         header,
         rows,
         "error-budget",
@@ -124,10 +125,20 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
     keys = [(prefix, name) for name in ("free_rms", "detection_level") for prefix in ("effort", "ekf")]
     rows = tuple(run_row(context, t, (*keys, ("ekf", "push_delay"), ("ekf", "lag_part"))) for t in tracks)
     return Table(
-        "The cost of real time. Results are those of the smoother, which uses samples before and after each instant. "
-        "The filter is what real time would see: RMS and detection level in free space of both; the filter's delay of "
-        "the peak of a push of 1 s; and the part of its standard deviation due to its lag.",
-        ("Joint", "Worst free run", "RMS, smoother", "RMS, filter", "Level, smoother", "Level, filter", "Delay", "Lag"),
+        "The cost of real time. The report's results are those of the smoother, which uses samples before and after "
+        "each instant. In real time only the filter is available. RMS and level: RMS and detection level in free "
+        "space. Delay: of the peak of a push of 1 s by the filter. Lag error: the part of the filter's standard "
+        "deviation that its lag makes.",
+        (
+            "Joint",
+            "Worst free run",
+            "RMS, smoother",
+            "RMS, filter",
+            "Level, smoother",
+            "Level, filter",
+            "Delay",
+            "Lag error",
+        ),
         rows,
         "real-time-cost",
         "llrrrrrr",
@@ -215,7 +226,8 @@ def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     )  # fmt: skip
     return Figure(
         f"Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown "
-        f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in [settings] changes it.",
+        f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
+        "",
         f"Noise of the filter over its delay for {len(noises)} joints.",
         panels,
         "noise-over-delay",

@@ -31,10 +31,14 @@ PUSH_SHAPES = {
 }
 # What the simulator puts into a joint: the effect, its parameters in truth.toml, and the terms that represent it.
 EFFECTS = (
-    ("viscous friction", "v = {viscous:g}", "viscous friction"),
-    ("Coulomb friction, up and down", "c = {coulomb_up:g}, {coulomb_down:g}", "Coulomb friction|offset"),
-    ("Stribeck peak", "s = {static_up:g}, {static_down:g}; w = {stribeck_velocity:g}", "Stribeck friction"),
-    ("presliding (LuGre)", "σ₀ = {bristle_stiffness:g}; σ₁ = {bristle_damping:g}", "presliding friction"),
+    ("viscous friction", "{viscous:g}", "viscous friction"),
+    ("Coulomb friction, up; down", "{coulomb_up:g}; {coulomb_down:g}", "Coulomb friction|offset"),
+    (
+        "Stribeck: static friction, up; down; velocity",
+        "{static_up:g}; {static_down:g}; {stribeck_velocity:g}",
+        "Stribeck friction",
+    ),
+    ("presliding (LuGre): stiffness; damping", "{bristle_stiffness:g}; {bristle_damping:g}", "presliding friction"),
 )
 WITHOUT_TERM = "none: the current is measured"
 COMPONENTS = ("f_x", "f_y", "f_z")
@@ -50,8 +54,8 @@ def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
-        "analysis reads it. This section compares external efforts with it, and the parameters of models that have "
-        "all of the friction that was put in."
+        "analysis reads it. This section compares external efforts with it, and parameters where the filter's model "
+        "has terms for all of the friction that was put in."
     )
     yield from effects(context)
     errors: list[float] = []
@@ -222,7 +226,7 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
 def truth_verdict(name: str, errors: list[float]) -> Verdict:
     """Whether errors agree with the stated standard errors."""
     level, counts = truth_level(errors)
-    return Verdict(level, f"**{name}**: of {count(len(errors), 'error')}, in standard errors, {counts}.")
+    return Verdict(level, f"**{name}**: of {count(len(errors), 'error')}, {counts}.")
 
 
 def force_figure(force: TipForce, pushes: list[Push]) -> Figure:

@@ -27,8 +27,8 @@ UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the corre
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact or reversals",
-    "mended": "white if tested causes are corrected",
-    UNEXPLAINED: "not white, whatever tested cause is corrected",
+    "mended": "white once tested causes are removed",
+    UNEXPLAINED: "not white even without all tested causes",
 }
 PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
@@ -42,7 +42,7 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The section's content."""
-    assumed = " ([@filter-assumptions])" if context.catalogue.records(Track) else ""
+    assumed = "; [@filter-assumptions] has its size" if context.catalogue.records(Track) else ""
     yield Prose(
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
@@ -50,8 +50,9 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
         "combinations, until the tests pass. To remove contact or reversals, their samples are left out. The random "
         "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
-        "replaced by their maximum-likelihood estimate for this log. A cause is named only if the tests pass without "
-        "it, with p-values at least a hundred times larger, and fail if as many samples are left out elsewhere. "
+        "replaced by their maximum-likelihood estimate for this log. A cause is named as the whole cause only if the "
+        "tests pass without it, with p-values at least a hundred times larger, and fail if as many samples are left "
+        "out elsewhere. Otherwise the share of the correlation that it explains is stated. "
         f"The filter's random walk is chosen to follow pushes{assumed}. In free motion this walk is larger than "
         "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
     )

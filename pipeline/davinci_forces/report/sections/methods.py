@@ -85,8 +85,9 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
     )),
     (records.Choice, (
         Prose("**Choice of the model.** Each candidate is refitted without blocks of path, halves of it and whole "
-              "logs. Of the candidates that are not clearly worse than the best, the simplest is chosen. Clearly is "
-              "more than one standard error of the difference, by the jackknife over parts (Efron, 1982)."),
+              "logs. Of the candidates with fixed terms, the simplest that is not clearly worse than the best is "
+              "taken; a searched model replaces it if its error is lower. “Clearly worse” is by more than one standard "
+              "error of the difference, by the jackknife over parts (Efron, 1982)."),
         Equation("E = overline(sqrt(sum_g norm(tau_g - Phi_g hat(theta)_(-g))^2)) / norm(tau)",
                  "the relative error, mean over ways to leave out parts, by parameters without them", "choice-error"),
     )),
@@ -110,41 +111,43 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
               "noise."),
     )),
     (records.ErrorBand, (
-        Prose("**Band.** The smoother knows nothing of the model's error. So its deviation is calibrated on free "
-              "motion outside the fit, of other logs, by range of speed, so that $1.96 s$ covers 95 % of it. Few logs "
-              "widen it."),
+        Prose("**Band.** The smoother's deviation does not include the model's error. Free motion of other logs, which "
+              "were not fitted, shows this error: for each range of speed, the stated deviation $s$ is scaled so that "
+              "$1.96 s$ covers 95 % of it. If there are few logs, the factor is larger."),
         Equation('v = max(overline(e^2 - s_e^2), 0), quad kappa = 1/1.96 op("quantile")_95 abs(e) / sqrt(s_e^2 + '
                  "v), quad s = kappa sqrt(s_e^2 + v)",
                  "the model's variance, the factor from the 95 % quantile of normalised errors, and the stated "
                  "deviation", "band"),
     )),
     (records.Threshold, (
-        Prose("**Detection.** A contact lasts while the smoothed effort (Bierman, 1973) exceeds the level that free "
-              "motion crosses once in ten minutes (Rice, 1944), or its largest effort. The detection level of the "
-              "tables is the 99 % quantile of $abs(e)$."),
+        Prose("**Detection.** A contact lasts while the smoothed effort (Bierman, 1973) exceeds the alarm level. This "
+              "is the larger of two: the largest effort in free motion, and the level that free motion crosses once in "
+              "ten minutes (Rice, 1944). The detection level of the tables is the 99 % quantile of $abs(e)$."),
         Equation("cal(l) = max(max abs(e), sqrt(overline(e^2)) sqrt(2 ln(600 z_0)))",
                  "the alarm level: root mean square times the root of twice the logarithm of 600 s times the "
                  "crossing rate", "detection"),
     )),
     (records.Weight, (
-        Prose("**Weighing.** A mass is fitted to the external efforts of all joints that carry it. A day's offset "
-              "is removed with the means. Its standard error is the jackknife's over sixths of the path, with the "
-              "error of the fit; masses in free motion widen it (Birge, 1932)."),
+        Prose("**Weighing.** A mass is fitted to the external efforts of all joints that carry it. The means over the "
+              "run are subtracted on both sides, and with them a day's offset. The standard error of the mass combines "
+              "the jackknife over sixths of the path with the error of the fit. It is larger if logs without a mass "
+              "show one (Birge, 1932)."),
         Equation('hat(m)_L = (sum_r c_r^T tau_("ext",r) \\/ epsilon_r^2) / (sum_r c_r^T c_r \\/ epsilon_r^2)',
                  "the mass: efforts per kilogram times external efforts, over their squares, weighted by the model "
                  "error", "weighing"),
     )),
     (records.TorqueConstant, (
-        Prose("**Torque constant.** The mass that a joint alone shows with its constant gives another constant, with "
-              "which it shows the known mass. Its standard error averages the jackknife variances of the run and of "
-              "free motion, widened by Student's t."),
+        Prose("**Torque constant.** The constant in use is scaled until the joint alone gives the known mass. The "
+              "variance of the result is the mean of two jackknife variances, of the run and of free motion. The "
+              "factor of Student's t widens its interval."),
         Equation('hat(K)_m = K_m m_L \\/ hat(m)_L',
                  "the torque constant: the one in use times the known mass over the apparent one", "torque-constant"),
     )),
     (records.TissueModel, (
-        Prose("**Tissue.** Stiffness is the median slope of straight lines through the contacts of the pushes. Of four "
-              "laws ($B = 0$ or not; $nu = 1$, then with damping $B dot(d)$, or not), the simplest is taken that "
-              "predicts pushes left out not clearly worse than the best (Hunt and Crossley, 1975)."),
+        Prose("**Tissue.** Stiffness is the median slope of straight lines through the contacts of the pushes. There "
+              "are four laws: linear ($nu = 1$, where the damping is $B dot(d)$) or a power of depth, each with "
+              "damping or without ($B = 0$). The simplest law is taken whose prediction of left-out pushes is not "
+              "clearly worse than the best (Hunt and Crossley, 1975)."),
         Equation("F_T = F_0 + K_T d^nu + B d^nu dot(d)",
                  "force on tissue: offset, stiffness times a power of depth, and damping times that power and the "
                  "rate", "tissue-law"),
@@ -164,7 +167,7 @@ def section(context: Context) -> Section:
         "Symbols.", ("Symbol", "Is", "Unit"), tuple((s, m, u or "–") for s, m, u in SYMBOLS), "symbols", "lll"
     )
     limits = Table(
-        "The thresholds of all verdicts of this report.",
+        "The thresholds of the verdicts of this report.",
         ("Quantity", "Measure", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
     )  # fmt: skip
     text = (Listing(paragraph_for_paper(context)),) if context.own_fits() else ()
@@ -196,7 +199,8 @@ def paragraph_for_paper(context: Context) -> str:
     summaries = [summary for summary in context.catalogue.records(records.LogSummary) if summary.log in logs]
     rates = " to ".join(dict.fromkeys(f"{rate:.4g}" for rate in sorted(s.rate for s in summaries)))
     averaged = ", averaged over periods" if context.catalogue.records(records.Trajectory) else ""
-    walk = f"{settings.q_tau:g} effort/s^0.5" if settings.q_tau else "the least that returns 90 % of a push of 1 s"
+    slowest = f"the slowest that shows 90 % of a push of 1 s at most {settings.delay:g} s late"
+    walk = f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})"
     scores = "; ".join(filter(None, (unseen_score(context, joint.name) for joint in robot.joints))) or "none"
     return fill(
         f"External efforts of an arm ({robot.title}) were estimated from motor efforts and joint positions with "
@@ -204,10 +208,10 @@ def paragraph_for_paper(context: Context) -> str:
         f"from {len(logs)} recording{'' if len(logs) == 1 else 's'} ({', '.join(sorted(logs))}) of "
         f"{sum(s.duration for s in summaries):.0f} s in all at {rates} Hz{averaged}; the model was "
         f"{'selected by cross-validation over blocks of path' if settings.fit == CHOSEN else settings.fit}. Model, "
-        "error (root mean square, beyond noise) on unseen data, and level that 99 % of the external effort stays below "
-        f"in free motion: {scores}. For the errors, effort and prediction passed one low-pass of {settings.lowpass:g} "
+        "error (root mean square, beyond noise) on unseen data, and level below which 99 % of free-motion samples "
+        f"stay: {scores}. For the errors, effort and prediction passed one low-pass of {settings.lowpass:g} "
         "Hz without delay. The external effort was tracked by an extended Kalman filter with position, velocity and "
-        f"external effort as states, the last as a random walk of intensity {walk}. Standard errors (±) allow for "
+        f"external effort as states, the last as a random walk {walk}. Standard errors (±) allow for "
         "autocorrelation, by restricted likelihood (Patterson and Thompson, 1971) or blocks (Künsch, 1989).",
         88, break_on_hyphens=False,
     )  # fmt: skip

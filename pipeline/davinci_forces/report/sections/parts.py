@@ -37,10 +37,9 @@ LEFT_OUT = {
     "leave a segment out": "a segment",
 }
 MEASURES = (
-    "With periods or logs left out, the error measures how well a model describes the motion that it was fitted to. "
-    "All periods follow the same path, so extra parameters lower this error even if they overfit. With blocks of path "
-    "left out, on raw samples, the error measures what to expect on a new path. This error is larger, and the model is "
-    "chosen by this error."
+    "With periods left out, the error measures how well a model describes the path that it was fitted to: all periods "
+    "follow this path, so extra parameters lower this error even if they overfit. With blocks of path left out, on raw "
+    "samples, the error measures what to expect on a new path. This error is larger, and the model is chosen by it."
 )
 
 

@@ -29,18 +29,19 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
         "joint has more than 20 such logs, groups of successive logs are left out together. The chosen model is also "
         "refitted without blocks of path and, if there are several logs, without each log. If a joint has one log "
-        "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
-        "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
+        "only, each of its periods is left out in turn. On the fitted path the fit absorbs part of the model's error, "
+        "so scores there are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "after the noise variance is subtracted. Mean: the constant part of this difference, as from another payload. "
+        "after the noise variance is subtracted. "
         "Samples at which the joint stands still are left out, as friction can then take any value."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")
     caption = (
         "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit; share "
-        "of the run's path (the variance of its position) that no fitted path explains; model error; its mean; and the "
-        "model error over the root mean square of the effort."
+        "of the run's path (the variance of its position) that no fitted path explains; model error; the mean "
+        "(constant part) of the difference, as from another payload; and the model error over the root mean square of "
+        "the effort."
     )
     yield from paper_or_screen(
         Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrrr")

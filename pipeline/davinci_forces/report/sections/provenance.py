@@ -33,7 +33,10 @@ def blocks(context: Context) -> Iterator[Block]:
     yield from paper_or_screen(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
-    yield Prose("Settings used, defaults included; `harmonics` = 0 takes the robot's, `q_tau` = 0 the computed one:")
+    yield Prose(
+        "Settings used, defaults included. `harmonics` = 0 takes the robot's number. `q_tau` is the intensity of the "
+        "random walk; 0 takes the computed one:"
+    )
     settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
     yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
     if study.changed:

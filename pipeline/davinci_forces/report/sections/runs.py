@@ -68,7 +68,7 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
     if at_rest:
         yield Prose(
-            f"Joints at rest are in the tables only ({', '.join(at_rest)}). At standstill friction takes any value up "
+            f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
             "to its static level, and hides external efforts up to that level."
         )
 

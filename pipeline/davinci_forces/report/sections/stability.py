@@ -38,11 +38,11 @@ ROWS = (
     ("filter_lag", "Filter’s lag, in logs", "at that frequency"),
     ("filter_share", "Filter’s gain, in logs", "at that frequency"),
     ("loop_delay", "Delay of the felt force", "filter, arm, link, sampling"),
-    ("felt_damping", "Damping felt without tissue", "arm’s motion in the sampled filter"),
-    ("best_delay", "Best additional delay", "largest limit by the response"),
+    ("felt_damping", "Damping felt in free motion", "filter’s error; negative values drive the hand"),
+    ("best_delay", "Added delay with the highest limit", "by the response"),
     ("k_t_best", "Limit with that delay", SAME),
-    ("damping_needed", "Damping needed for the measured tissue", "of the hand, by the response"),
-    ("delay_margin", "Additional delay until unstable", "all effects; 0: already unstable"),
+    ("damping_needed", "Damping that suffices for the measured tissue", "by the response; the hand’s own may suffice"),
+    ("delay_margin", "Added delay until unstable", "all effects; 0: already unstable; –: none up to 1 s"),
 )
 LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst switching", "vermillion"), "at contact": ("contact", "blue")}
 
@@ -85,7 +85,7 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
         words = f"**not stable** against the measured tissue, {tissue}; a damping of {needed} is needed"
     return Verdict(
         "good" if stable else "warn",
-        f"Hand “{name}”: {words}. The limit is elastic tissue of {headline}; with friction of the arm and damping of "
+        f"Hand “{name}”: {words}. Elastic tissue may have up to {headline}. With friction of the arm and damping of "
         f"the tissue, simulation finds {settles}.",
     )
 
@@ -102,7 +102,8 @@ def model(context: Context, limits: list[HandLimit]) -> str:
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
         "state the same limit: the formula takes the filter's lag and gain from logs, at the frequency at which the "
         "hand would oscillate; the response and the simulation contain the filter itself. "
-        f"{agree}The other rows say what else they include. Try other hands: `davinci-forces stability --help`."
+        f"{agree}The last column of [@stability-table] says what each row includes. Try other hands: `davinci-forces "
+        "stability --help`."
     )
 
 
@@ -111,10 +112,11 @@ def without_delay(context: Context) -> str:
     region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
     return (
         "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; see "
-        "[@stability-limits]. `davinci-forces stability` also solves its linear matrix inequality. It knows no "
-        f"delay and no sampling, and allows any switching. In {region} it proves nothing. Tissue acts in contact, and "
-        "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$ if the force comes at once. So "
-        "delay and sampling set the limit, not switching."
+        "[@stability-limits]. This function covers tissue that switches at any time, but neither delay nor sampling. "
+        f"In {region} no such function exists, which proves nothing about real tissue. Real tissue acts only in "
+        "contact. Then $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$, if the force "
+        "comes at once. So delay and sampling set the limit, not switching. `davinci-forces stability` also solves the "
+        "linear matrix inequality of the function."
     )
 
 
@@ -125,8 +127,8 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
     return Table(
         "Limits of the tissue's stiffness, and what they follow from. The standard error of the first includes those "
         "of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's parameters. A dash marks "
-        "a limit that was not found, or an error that is not known. No setting is changed.",
-        ("Stiffest stable tissue", *(hand_name(context, limit.hand) for limit in limits), "Includes"),
+        "a limit that was not found, or an error that is not known.",
+        ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes"),
         rows,
         "stability-table",
         "l" + "r" * len(limits) + "l",
@@ -136,7 +138,7 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
 def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Figure:
     """The map without delay, and the limit over an additional delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, the hand without delay: up to which a Lyapunov function exists "
+        "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
         "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
         "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
         (map_panel(context, tissues), delay_panel(context, limits, tissues)),
@@ -168,9 +170,9 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
 def tissue_lines(context: Context, tissues: list[Stiffness]) -> Iterator[HLine]:
     """The measured tissues; in simulations of the thesis's experiments, also the tissue of the thesis."""
     for i, tissue in enumerate(tissues):
-        yield HLine(tissue.stiffness, "" if i else "measured", "green", "solid")
+        yield HLine(tissue.stiffness, "" if i else "measured tissue", "green", "solid")
     if context.compares_with_thesis:
-        yield HLine(THESIS_TISSUE, "thesis", "black", "dotted")
+        yield HLine(THESIS_TISSUE, "thesis's tissue", "black", "dotted")
 
 
 def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Panel:
@@ -182,7 +184,7 @@ def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffne
             Line(MS * limit.delay[known], limit.k_t_delay[known], hand_name(context, limit.hand), colour, "solid")
         )
     marks += tissue_lines(context, tissues)
-    return Panel("Whole loop", "additional delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)
+    return Panel("Whole loop", "added delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)
 
 
 def motions(context: Context) -> Iterator[Figure]:

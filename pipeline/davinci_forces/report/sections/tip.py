@@ -93,8 +93,8 @@ def correlations(forces: Sequence[TipForce]) -> str:
         )
     sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
     return (
-        "The correlation of the joints' errors is estimated from the free motion of other logs, as far as these logs "
-        f"agree. Its largest value is {max(sizes):.2f}."
+        "The correlation of the joints' errors is estimated from the free motion of other logs; it is 0 where these "
+        f"logs disagree. Its largest value is {max(sizes):.2f}."
     )
 
 
@@ -102,10 +102,10 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
     rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
     return Table(
-        "The largest force at the tip in each contact, with standard deviations. Least certain: the largest standard "
-        "deviation over all directions, and the direction of this deviation. “Found” marks windows that the study does "
-        "not state; “near singular” marks poses in which the force is uncertain.",
-        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least certain", "Direction"),
+        "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
+        "in the direction in which it is largest, and this direction. A window may be marked: “found” is not stated by "
+        "the study, and “near singular” is a pose in which the force is uncertain.",
+        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction"),
         rows,
         "tip-contacts",
         "llrrrrrl",
@@ -145,9 +145,10 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
         "The size of the estimated force at the tip in free space, where the true force is zero: root mean square "
         "(RMS), and the levels that 95 % and 99 % (detection level) of samples stay below. Forces below the detection "
         "level cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains "
-        "zero. Condition: the median condition number of the Jacobian, which compares the certainty of the force "
-        f"between directions. Near singular: samples with a condition number above {NEAR_SINGULAR:g}, at which the tip "
-        "is within about a centimetre of the remote centre; these samples are left out.",
+        "zero. Condition: the median condition number of the Jacobian, the ratio between the errors of the force in "
+        "its least and its most certain direction if all joints err alike. Near singular: samples with a condition "
+        f"number above {NEAR_SINGULAR:g}, at which the tip is within about a centimetre of the remote centre; these "
+        "samples are left out.",
         ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
         rows,
         "tip-levels",

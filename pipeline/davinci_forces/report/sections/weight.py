@@ -89,9 +89,9 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         for of in constants
     )
     return Table(
-        "Torque constants with which the measured currents carry the known mass, each from one joint alone. They are "
-        "proposals that nothing applies: `torque_constant` in study.toml does. They assume the stated mass, its "
-        "position and the gear ratio. Joints whose current shows the mass too imprecisely are left out.",
+        "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
+        "apply one, write it as `torque_constant` in study.toml. They assume the stated mass, its position and the "
+        "gear ratio. Joints whose current shows the mass too imprecisely are left out.",
         ("Log", "Joint", "Known mass", "Used", "Proposed"),
         rows,
         "torque-constants",
@@ -178,11 +178,13 @@ def by_joint(context: Context, weight: Weight) -> Table:
     agree, mirrored = (
         context.probability(f"weight.{weight.log}.{name}") for name in ("agreement", "agreement_mirrored")
     )
+    together = (
+        f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
+    )
     return Table(
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at the stated position and "
-        "mirrored. False mass: the root mean square of the mass that the joint shows in free motion without one; the "
-        "standard error includes it. If the joints agree, their chi-square has a probability of "
-        f"{agree} ({mirrored} mirrored); below 0.01 they contradict each other. Also the offset of the day, and "
+        "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
+        f"standard error of the mass includes it.{together if len(rows) > 1 else ''} Also the offset of the day, and "
         "the root mean squares of the residual with the mass and of the model's error in free motion.",
         ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion"),
         rows,

@@ -16,7 +16,7 @@ from davinci_forces.runner.runs import folders
 def read(study: Path, kind: str, selection: dict[str, str]) -> pd.DataFrame:
     """All records of a kind whose fields equal those of `selection`, in one DataFrame; see `davinci_forces.read`."""
     if kind not in KINDS:
-        raise BadRequest(f"there is no record {kind!r}; there are {', '.join(KINDS)}")
+        raise BadRequest(f"there is no kind of record {kind!r}; the kinds are {', '.join(KINDS)}")
     unknown = set(selection) - set(KINDS[kind].scalars())
     if unknown:
         raise BadRequest(f"{kind} has no {', '.join(sorted(unknown))}; it has {', '.join(KINDS[kind].scalars())}")
@@ -53,7 +53,7 @@ def results(study: Path) -> pd.DataFrame:
 
 
 def as_frame(record: Record) -> pd.DataFrame:
-    """A record as a DataFrame; its key and its scalars, except tuples, are repeated in every row."""
+    """A record as a DataFrame; its key and its single values (tuples left out) are repeated in every row."""
     scalars = {name: getattr(record, name) for name in record.scalars()}
     repeated = {name: value for name, value in scalars.items() if not isinstance(value, tuple)}
     columns = {name: getattr(record, name) for name in record.columns()}
@@ -62,7 +62,8 @@ def as_frame(record: Record) -> pd.DataFrame:
 
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
-    """Map each field to its unit, or to a dictionary from joint (or `group` of joints) to unit if units differ."""
+    """Map each field to its unit; where a unit differs between joints, to a dictionary from joint (or group) to "
+    "unit."""
     units_by_joint: dict[str, dict[str, str]] = {}
     for record in records:
         for name, unit in record.origin.units.items():

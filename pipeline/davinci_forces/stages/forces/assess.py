@@ -1,4 +1,4 @@
-"""Compute the level that external efforts in free space stay below, and the alarm level that detects a contact."""
+"""Compute two levels from free motion: the alarm level finds contacts, the lower detection level judges their peaks."""
 
 from collections.abc import Iterable, Iterator
 

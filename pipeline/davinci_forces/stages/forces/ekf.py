@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.filters import DEFAULT, diverges, filter_parts, rts
 from davinci_forces.filters.error_bands import TotalVariance, total_variance
 from davinci_forces.filters.problem import NoiseModel, filter_inputs
-from davinci_forces.filters.response import lag, noise_model, rise
+from davinci_forces.filters.response import lag_error, noise_model, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
@@ -44,7 +44,7 @@ def track_effort(
         if not np.isfinite(estimate.tau_ext).all():
             return
     smooth = filter_parts(SMOOTHER, parts, noise)
-    late = lag(parts, smooth.tau_ext, noise)
+    late = lag_error(parts, smooth.tau_ext, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
     moving = (model.unscored == 0) | bool(model.at_rest)
     offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)

@@ -1,4 +1,4 @@
-"""Measure what is lost if samples are filtered as they arrive, without later ones."""
+"""Compare the smoother with a filter that gets samples as they arrive, as in real time; filters recorded logs."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 

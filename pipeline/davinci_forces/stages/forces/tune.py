@@ -1,4 +1,4 @@
-"""Tune the filter noise of every joint by the likelihood of the innovations, and take the median over its logs."""
+"""Tune the filter noise of every joint by the likelihood of the innovations, log by log, and take the median."""
 
 from collections.abc import Iterable, Iterator
 

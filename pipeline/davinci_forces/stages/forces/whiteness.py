@@ -1,4 +1,5 @@
-"""Test whether the residuals of averaging, fit and filter are white noise, and find causes if innovations are not."""
+"""Test whether residuals and innovations are white noise, and find the causes where the filter's innovations are "
+"not."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 

@@ -16,9 +16,9 @@ from davinci_forces.identification.identifiability import (
     describe_correlated,
     describe_insignificant,
     hardly_described,
-    inertia_at_fault,
     join_names,
     moving_with,
+    why_not_positive,
 )
 from davinci_forces.identification.left_out import left_out
 from davinci_forces.identification.model_error import model_std
@@ -192,7 +192,7 @@ def identifiability(
     if wrong:
         estimate = plain if "lse" in wrong else estimates[wrong[0]]
         verb = "estimates" if len(wrong) == 1 else "estimate"
-        why = inertia_at_fault(robot, joint, estimate, excitation, others)
+        why = why_not_positive(robot, joint, estimate, excitation, others)
         message = f"{model.group}: {join_names(wrong)} {verb} an inertia that is not positive: {why}"
         yield diagnostic("fit", model.group, "warning", message)
     if message := hardly_described(joint, r_squared(regression, plain), others):

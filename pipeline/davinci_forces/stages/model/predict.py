@@ -1,4 +1,4 @@
-"""Predict and score the effort of logs that no fit has used, and evaluate the model of every joint along every log."""
+"""Predict and score the effort of logs that no fit has used, and compute the modelled effort along every log."""
 
 from collections.abc import Collection, Iterable, Iterator
 

@@ -28,7 +28,11 @@ MEASURED = ("q", "dq", "tau")
 def run(
     signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int, lowpass: float
 ) -> Iterator[Average | PeriodResidual | Diagnostic]:
-    """Average the periods of each moving joint over the longest periodic stretch that all joints of a log share."""
+    """Average the periods of each moving joint over the longest periodic stretch that all joints of a log share.
+
+    Samples are narrowed in three steps.  In the `periodic` stretch the motion repeats.  In the `agreeing` stretch the
+    periods do not differ.  Of that, whole periods of measured samples are `used`.
+    """
     if entry.role != "identification":
         return
     moving = [signal for signal in signals if not signal.at_rest]
@@ -44,21 +48,21 @@ def run(
     max_harmonics = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)
     if repeat is None:
-        message = f"{no_repetition(moving[0], entry)}, so nothing is averaged"
-        yield diagnostic("average", entry.name, "note", f"{message}; its parameters come from the low-passed samples")
+        message = f"{no_repetition_message(moving[0], entry)}, so nothing is averaged"
+        yield diagnostic("average", entry.name, "note", f"{message}; parameters are fitted to its low-passed samples")
         return
-    span, length = longest_stretch(moving, repeat, max_harmonics, entry)
+    periodic, length = longest_stretch(moving, repeat, max_harmonics, entry)
     names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in MEASURED]
     columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
-    agreeing, length, differing = agreeing_stretch(t, positions, columns, span, length, rate, max_harmonics)
-    remarks += omissions(moving[0], span, agreeing, length, [(names[d.signal], d) for d in differing])
+    agreeing, length, differing = agreeing_stretch(t, positions, columns, periodic, length, rate, max_harmonics)
+    remarks += omissions(moving[0], periodic, agreeing, length, [(names[d.signal], d) for d in differing])
     std = standard_error(t[agreeing], [x[agreeing] for x in positions], length, max_harmonics)
     period, period_remarks = reconcile_period(Period(length, std), entry)
     remarks += period_remarks
     filled = np.any([signal.filled for signal in moving], axis=0)
-    start = agreeing.start + int(np.argmin(filled[agreeing]))
+    start = agreeing.start + int(np.argmin(filled[agreeing]))  # the first sample that was measured, not filled in
     used = np.arange(start, end(t, slice(start, agreeing.stop), period.length, rate))
     used = used[~filled[used]]
     phased = Phases(t[used], period.length, phases(period.length, rate))
@@ -82,8 +86,8 @@ def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal]
         repeat = common_repetition(periodic) if periodic else None
     if repeat is None and entry.period:
         raise NotPeriodic(
-            f"{no_repetition(moving[0], entry)}, but the study states a period of {entry.period} s; record more "
-            "periods, leave out what comes before and after them (skip and until in study.toml), or give the log "
+            f"{no_repetition_message(moving[0], entry)}, but the study states a period of {entry.period} s; record "
+            "more periods, leave out what comes before and after them (skip and until in study.toml), or give the log "
             "another role"
         )
     if repeat is None:
@@ -93,7 +97,7 @@ def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal]
     return periodic, repeat, remarks
 
 
-def no_repetition(first: Signal, entry: LogEntry) -> str:
+def no_repetition_message(first: Signal, entry: LogEntry) -> str:
     """Return the message that a log does not repeat, with its duration."""
     duration = first.t[-1] - first.t[0] + 1.0 / first.rate
     return f"{entry.name}: {duration:.2f} s contain no motion that repeats at least twice"
@@ -134,39 +138,44 @@ def longest_stretch(
     return span, length
 
 
-def multiples(length: float, stated: float | None, whole_periods: int) -> list[int]:
+def multiples(length: float, stated: float | None, periods: int) -> list[int]:
     """Factors by which the period may be longer than `length`; the factor of the stated period is the first."""
     stated_factor = [round(stated / length)] if stated else []
-    return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= whole_periods // 2]
+    return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= periods // 2]
 
 
 def omissions(
-    first: Signal, span: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
+    first: Signal, periodic: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
 ) -> list[str]:
     """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out."""
     t = first.t
-    sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (span.start > 0)
-    sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (span.stop < len(t))
-    faults = [f"{' and '.join(sides)} do not repeat, as in a stop, a ramp or another motion{gaps_at(first, span)}"]
-    faults *= bool(sides)
+    sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (periodic.start > 0)
+    sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
+    faults = []
+    if sides:
+        what = f"as in a stop, a ramp or another motion{gaps_at(first, periodic)}"
+        faults.append(f"{' and '.join(sides)} do not repeat, {what}")
     for name, d in differing:
         inside = d.has_periods_on_both_sides
-        if inside or t[agreeing.start] - t[span.start] > MIN_REPORTED_TRANSIENT * length or not sides:
-            number = f"{'the remaining ' * (d.periods < differing[0][1].periods)}{d.periods}"
+        long = t[agreeing.start] - t[periodic.start] > MIN_REPORTED_TRANSIENT * length
+        if inside or long or not sides:  # beside a standstill, a short transient is expected
+            fewer = d.periods < differing[0][1].periods
+            number = f"the remaining {d.periods}" if fewer else f"{d.periods}"
             differs = f"period {d.period + 1} of {number} differs from the others by {d.rms:.3g} rms in {name}"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
             faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
     keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
-    evaluated = f"{'only ' * bool(keys)}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
+    evaluated = f"{'only ' if keys else ''}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
     advice = f"; to confirm this, write {' and '.join(keys)} in study.toml" if keys else ""
-    return [f"{first.log}: joints repeat every {length:.4f} s; {'; '.join(faults)}; {evaluated}{advice}"] * bool(faults)
+    repeats = f"{first.log}: joints repeat every {length:.4f} s"
+    return [f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"] if faults else []
 
 
-def gaps_at(signal: Signal, span: slice) -> str:
-    """Report clock gaps at the ends of the evaluated stretch, after which the phase of the motion is unexpected."""
+def gaps_at(signal: Signal, periodic: slice) -> str:
+    """Report clock gaps at the ends of the periodic stretch, after which the phase of the motion is unexpected."""
     t, segment = signal.t, signal.segment
-    edges = [i for i in (span.start, span.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
+    edges = [i for i in (periodic.start, periodic.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
     gaps = [f"{t[i] - t[i - 1]:.4g} s at {t[i - 1]:.2f} s" for i in edges]
     return f"; after the clock's gap of {' and of '.join(gaps)}, the motion does not continue in phase" if gaps else ""
 

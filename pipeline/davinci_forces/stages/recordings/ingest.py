@@ -1,4 +1,4 @@
-"""Read every log and convert it to SI units of the joints: one recording per joint, and contact force and depth."""
+"""Read every log, convert it to the joint side in SI units, and write one recording for each of its joints."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,5 @@
-"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of the band."""
+"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of the 95 % "
+"band."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Compute the stability limits of haptic feedback: the largest tissue stiffness, in theory and in simulation."""
+"""Compute the stiffest tissue for stable haptic feedback with this study's arm, filter and measured tissue."""
 
 from collections.abc import Iterable, Iterator, Sequence
 

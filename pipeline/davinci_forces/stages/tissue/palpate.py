@@ -1,4 +1,4 @@
-"""Find every push of a tissue log, and estimate the stiffness and the model of the tissue."""
+"""Find every push of a tissue log, estimate the tissue's stiffness, and choose the law that predicts its force."""
 
 from collections.abc import Iterator, Sequence
 

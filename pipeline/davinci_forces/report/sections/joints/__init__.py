@@ -51,8 +51,9 @@ def intro() -> Prose:
     """Explain the columns of the tables."""
     return Prose(
         "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
-        "two parts: noise, by the differences between periods, and model, by the change without blocks of path, or "
-        "with other friction. $z$ is the value over both. With $abs(z) < 2$ it may be zero in a better model."
+        "two parts. The part from noise follows from the differences between periods. The part from the model is the "
+        "change of the value if blocks of path are left out, or if the friction is modelled otherwise. $z$ is the "
+        "value over its standard error, both parts together. If $abs(z) < 2$, the parameter may be zero."
     )
 
 
@@ -112,15 +113,16 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
         side = "after" if used.effort_lag[row] > 0 else "before"
         changed.append(f"the effort is taken {1e3 * abs(used.effort_lag[row]):g} ms {side} the motion")
     changed += [f"its estimator is {title_of(used.estimator)}"] if used.estimator != plain.estimator else []
-    text = f"Compared with the joint by itself ({fit_name(plain.model, plain.estimator)}): {'; '.join(changed)}."
+    by = "least squares (LSE)" if plain.estimator == "lse" else title_of(plain.estimator)
+    text = f"Compared with the plain model (this joint alone, by {by}): {'; '.join(changed)}."
     unseen = [p for p in context.catalogue.select(Prediction, joint=joint, model=CHOSEN) if p.role != "identification"]
     if not unseen:
         return text
     worst = max(unseen, key=lambda p: p.relative_error)
     before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
     after = context.number(f"{worst.prefix}.relative_error", 3)
-    where = f"In {literal(worst.log)}, its worst log of those not fitted"
-    return f"{text} {where}, the relative error is {after}; that of the joint by itself is {before}."
+    where = f"Of the logs that were not fitted, its relative error (noise included) is largest in {literal(worst.log)}"
+    return f"{text} {where}: {after}, and {before} by the plain model."
 
 
 def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
@@ -156,7 +158,7 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
         f"Parameters of the {literal(joint.replace('_', ' '))}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. Mean squared error of the effort: {mse}."
         f"{coupled}",
-        ("Symbol", "Parameter", "Unit", "Value", "Error of noise", "Error of the model", "$z$"),
+        ("Symbol", "Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$"),
         table_rows,
         label=f"theta-{joint}",
         align="lllrrrr",
@@ -180,11 +182,13 @@ def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
     for fit in used.values():
         rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
         if rows:
-            header = ("", "Parameter", "Unit", "Value", "Error of noise", "Error of the model", "$z$")
+            header = ("", "Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
             caption = (
-                f"Parameters of the links: {fit_name(fit.model, fit.estimator)}; they act on {moved}. Only these "
-                "combinations of masses, centres and inertias affect an effort. Each has the name of its first one."
+                f"Parameters of the links, by the model “{fit_name(fit.model, fit.estimator)}”; they act on {moved}. "
+                "Only combinations of masses, centres and inertias affect an effort; each is named after its first "
+                "parameter. “mx of 2” is the mass of link 2 times the x of its centre; links are numbered from the "
+                "base."
             )
             body = tuple(parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1))
             tables.append(Table(caption, header, body, f"links-{fit.group}", "lllrrrr"))

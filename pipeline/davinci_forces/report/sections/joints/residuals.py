@@ -113,7 +113,7 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
     if within > MIN_RATIO_REVERSALS:
         larger = f"Around reversals of velocity the residual's RMS is {within:.1f} times its RMS elsewhere"
         return f"{text}. {larger}. {ADVICE['reversals'] if is_plain else ALL_TRIED}"
-    return f"{text}. These plots show no missing term that depends on position alone or on velocity alone."
+    return f"{text}. Neither is enough to show a missing term."
 
 
 def share_within_reversals(errors: Column, dq: Column) -> float:

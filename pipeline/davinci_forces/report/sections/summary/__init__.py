@@ -90,7 +90,8 @@ def rule_in_words(trusts: list[Trust]) -> str:
     by_level = "detection level over the effort sought"
     by_error = "model error over effort"
     rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
-    return f"Each row is the joint's worst run that was not fitted. Verdicts follow from {rule}, by [@thresholds]."
+    worst = "Each row is a joint's worst run (one joint in one log) that was not fitted."
+    return f"{worst} Verdicts follow from {rule}, by [@thresholds]."
 
 
 def caption(contacts: list[Contact]) -> str:
@@ -98,8 +99,8 @@ def caption(contacts: list[Contact]) -> str:
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort on each joint in its worst run that was not fitted. {level}"
-    which = "in its contact log with the largest model error, contact windows shaded"
-    return f"External effort on each joint {which}. {level}"
+    which = "the largest model error, of those in which only this joint is touched if there are any"
+    return f"External effort on each joint, contact windows shaded. The log is the one with {which}. {level}"
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -114,13 +115,14 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
-        f"on {count(len(trusts), 'joint')} in {count(logs, 'log')} of the {literal(context.study.robot.title)}. "
+        f"on {count(len(trusts), 'joint')} of the {literal(context.study.robot.title)}, in {logs} of "
+        f"{count(len(context.study.logs), 'log')}. "
         f"{logs_in_words(context)}"
     )
     if not windows:
         return f"{text} No contact is measured, as the study states no contact windows."
-    found = f"In {above} of {count(windows, 'contact')} (one window on one joint)"
-    return f"{text} **{found}, the effort exceeds the detection level.**"
+    found = f"In {above} of {count(windows, 'contact')}"
+    return f"{text} A contact is one window on one joint. **{found}, the effort exceeds the detection level.**"
 
 
 def efforts_in_words(context: Context) -> str:
@@ -198,10 +200,10 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     return Table(
-        "Trust in the estimates. New path: share not fitted. Model error: RMS of measured minus modelled effort, "
-        "without noise. Error/effort: its share of the measured effort's RMS; $R^2$ includes the noise. Ceiling: "
-        "largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: "
-        "their share in the 95 % band.",
+        "Trust in the estimates. New path: share of the run's path that no fitted path explains. Model error: RMS of "
+        "measured minus modelled effort, without noise. Error/effort: model error over the RMS of the measured effort; "
+        "$R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space "
+        "samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",

@@ -39,7 +39,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
     which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
-        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["the 95 % bands are right or too wide"]
+        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["no 95 % band is too narrow"]
     text = "; ".join(parts) or "no effort was estimated in free space"
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -55,7 +55,8 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
             level, error = "bad", f"{error}, whose detection level is above the effort sought"
         kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
     for (path, why), joints in kinds.items():
-        yield f"on {path} the model errs by {as_list(joints)}{f', {why}' if why else ''}"
+        follows = why or f"so judge {'its' if len(joints) == 1 else 'their'} efforts with caution"
+        yield f"on {path} the model errs by {as_list(joints)}, {follows}"
 
 
 def name_in_sentence(joint: str) -> str:
