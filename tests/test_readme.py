@@ -1,5 +1,6 @@
 """What README and guide tell of names, keys and defaults is what the code has, and what they lead to is there."""
 
+import ast
 import json
 import re
 import shutil
@@ -14,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 import davinci_forces
-from davinci_forces import commands, exports, robots, stages
+from davinci_forces import commands, exports, guide, robots, stages
 from davinci_forces.cli import app
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.logs import FORMATS
@@ -321,6 +322,48 @@ def test_no_page_is_left_out_of_the_index_and_none_has_the_name_of_another():
     assert len(topics) == len(set(topics))
     linked = {Path(link).stem for link in re.findall(r"\]\(([\w./-]+\.md)\)", PAGES["index"])}
     assert linked == {*topics} - {"index", "contributing", "changes", *CHANGES}
+
+
+def texts_of(folder: Path) -> str:
+    """The texts in the code of a folder, with `{}` in the place of values."""
+    texts = []
+    for file in sorted(folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                texts.append("".join(str(v.value) if isinstance(v, ast.Constant) else "{}" for v in node.values))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.append(node.value)
+    return "\n".join(texts)
+
+
+def test_messages_are_those_of_the_stages_and_no_stage_with_remarks_is_left_out():
+    table = rows("stage", "the remark says")
+    code = "\n".join(texts_of(PACKAGE / room) for room in ("stages", "identification", "logs", "maths", "runner"))
+    for stage, says, *_ in table:
+        for phrase in spans(says):
+            assert phrase in code, (stage, phrase)
+    speaking = {f.stem for f in (PACKAGE / "stages").rglob("*.py") if "diagnostic(" in f.read_text(encoding="utf-8")}
+    assert {spans(row[0])[0] for row in table} == {name.replace("_", "-") for name in speaking}
+    assert len({row[1] for row in table}) == len(table)
+
+
+def test_terms_are_in_order_and_each_once():
+    terms = [row[0] for row in rows("term", "means")]
+    assert terms == sorted(set(terms))
+
+
+def test_pages_that_are_made_have_every_field_name_and_robot_once():
+    pages = {page.topic: page.text for page in guide.pages()}
+    headings = re.findall(r"^## (.*)$", pages["fields"], re.M)
+    assert headings == [kind.__name__ for kind in KINDS.values()]
+    for heading, part in zip(headings, re.split(r"^## .*$", pages["fields"], flags=re.M)[1:], strict=True):
+        kind = next(kind for kind in KINDS.values() if kind.__name__ == heading)
+        assert sorted(re.findall(r"^\| `(\w+)`", part, re.M)) == sorted((*kind.scalars(), *kind.columns()))
+    assert re.findall(r"^## davinci_forces\.(\w+)$", pages["api"], re.M) == davinci_forces.__all__
+    assert "Stream.step(" in pages["api"]
+    assert "BadRequest" in pages["api"]
+    assert re.findall(r"^## (\w+)$", pages["robots"], re.M) == list(robots.ROBOTS)
+    assert "hand_roll" in pages["robots"]
 
 
 def test_the_readme_is_two_screens_to_the_first_result_and_not_much_more():

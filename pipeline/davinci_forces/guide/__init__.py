@@ -1,12 +1,14 @@
 """The guide: pages of Markdown in folders by purpose, for the terminal and as one HTML file that needs no network."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 from davinci_forces.errors import BadRequest
+from davinci_forces.guide import generated
 
 FOLDER = Path(__file__).parent
 GROUPS = {  # folder -> its heading, in the order of the list
@@ -30,7 +32,12 @@ class Page:
     folder: str
     title: str
     summary: str  # one sentence
-    text: str  # Markdown, with title and summary
+    write: Callable[[], str]  # makes the Markdown, with title and summary
+
+    @cached_property
+    def text(self) -> str:
+        """The Markdown of the page."""
+        return self.write()
 
     @property
     def as_text(self) -> str:
@@ -42,6 +49,7 @@ class Page:
 def pages() -> tuple[Page, ...]:
     """All pages, by group; in a group in the order in which the index links them."""
     found = [_read(file) for file in FOLDER.rglob("*.md")]
+    found += [_made(topic, *about) for topic, about in generated.PAGES.items()]
     index = next(page for page in found if page.topic == INDEX)
     order = [INDEX, *(link[2] for link in LINK.finditer(index.text))]
     place = {topic: i for i, topic in reversed(list(enumerate(order)))}
@@ -80,4 +88,8 @@ def _read(file: Path) -> Page:
     text = COMMENT.sub("", file.read_text(encoding="utf-8"))
     title, summary = (" ".join(part.split()) for part in text.split("\n\n", 2)[:2])
     folder = file.parent.relative_to(FOLDER).as_posix().removeprefix(".")
-    return Page(file.stem, folder, title.removeprefix("# "), summary, text)
+    return Page(file.stem, folder, title.removeprefix("# "), summary, lambda: text)
+
+
+def _made(topic: str, title: str, summary: str, body: Callable[[], str]) -> Page:
+    return Page(topic, "reference", title, summary, lambda: f"# {title}\n\n{summary}\n\n{body()}")

@@ -179,7 +179,10 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
             tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
         )
     if remarks_of_stages:
-        yield Prose("Remarks of the file readers and of the stages `ingest`, `resample` and `average`:")
+        yield Prose(
+            "Remarks of the file readers and of the stages `ingest`, `resample` and `average`; `davinci-forces guide "
+            "messages` explains them:"
+        )
         yield Bullets(tuple(remarks_of_stages))
 
 

@@ -90,7 +90,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
         level = stiffness_level(log, context.true_stiffness(log.log))
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
         quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
-        used = f" ({log.pushes} of {len(log)} pushes)"
+        used = f" ({log.pushes} of {len(log)} pushes in contact)"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
 

@@ -1,0 +1,87 @@
+"""Pages of the reference that are made from code when they are asked for: fields of records, Python, and robots."""
+
+import inspect
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+
+def fields() -> str:
+    """Every record with its fields, their units and meanings."""
+    from davinci_forces.records import KINDS
+    from davinci_forces.records.quantities import PER_ROW, QUANTITIES
+    from davinci_forces.robots import load
+
+    joints = {joint.kind: joint for joint in load("davinci", Path()).joints}  # one that turns, and one that slides
+    words = {"": "–", "1": "–", PER_ROW: "by row"}
+    blocks = []
+    for kind in KINDS.values():
+        rows = []
+        for name in (*kind.scalars(), *kind.columns()):
+            quantity = QUANTITIES[name]
+            unit = " or ".join(dict.fromkeys(joint.unit(quantity.unit) for joint in joints.values()))
+            unit = words.get(quantity.unit, unit)
+            rows.append((f"`{name}`", "column" if name in kind.columns() else "single", unit, quantity.meaning))
+        about = first_sentence(inspect.getdoc(kind))
+        blocks += [f"## {kind.__name__}", about, table(("field", "holds", "unit", "is"), rows)]
+    return "\n\n".join(blocks)
+
+
+def python() -> str:
+    """Every public name of the package, with its signature and docstring."""
+    import davinci_forces
+    from davinci_forces import arrays
+    from davinci_forces.filters.online import Stream
+    from davinci_forces.robots.robot import Robot
+
+    blocks: list[str] = []
+    for name in davinci_forces.__all__:
+        blocks += document_function(f"davinci_forces.{name}", getattr(davinci_forces, name))
+    for kind in (arrays.IdentifiedArm, Stream, Robot):
+        blocks += [f"## {kind.__name__}", first_sentence(inspect.getdoc(kind))]
+        for name, member in vars(kind).items():
+            if not name.startswith("_") and inspect.isfunction(member) and inspect.getdoc(member):
+                blocks += document_function(f"{kind.__name__}.{name}", member, level=3)
+    return "\n\n".join(blocks)
+
+
+def robots() -> str:
+    """Every shipped robot with its joints, their limits and the terms of their models."""
+    from davinci_forces.robots import ROBOTS, load
+
+    blocks = []
+    for name in ROBOTS:
+        robot = load(name, Path())
+        rows = [
+            (f"`{joint.name}`", joint.kind.name.lower(), " to ".join(f"{q:g}" for q in joint.limits.q),
+             ", ".join(term.name for term in joint.terms))
+            for joint in robot.joints
+        ]  # fmt: skip
+        title = f"{robot.title}: {len(robot.joints)} joints."
+        blocks += [f"## {name}", title, table(("joint", "kind", "limits [rad or m]", "terms of its own model"), rows)]
+    return "\n\n".join(blocks)
+
+
+PAGES = {  # topic -> title, summary and body
+    "fields": ("Fields of records", "Every field of every record, with its unit and meaning.", fields),
+    "api": ("Python names", "Every public function and class, with its signature, units and errors.", python),
+    "robots": ("Robots", "The robots that are shipped, with their joints.", robots),
+}
+
+
+def document_function(name: str, what: object, level: int = 2) -> Iterator[str]:
+    """A function as a heading, its signature, and its docstring."""
+    signature = str(inspect.signature(what)) if callable(what) else ""
+    signature = signature.replace("self, ", "").replace("(self)", "()")
+    yield f"{'#' * level} {name}"
+    yield f"```text\n{name}{signature}\n\n{inspect.getdoc(what)}\n```"
+
+
+def first_sentence(doc: str | None) -> str:
+    """The first paragraph of a docstring on one line."""
+    return " ".join((doc or "").partition("\n\n")[0].split())
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    lines = [header, ["---"] * len(header), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
