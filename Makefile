@@ -43,7 +43,7 @@ for folder in sorted((f for f in pathlib.Path("pipeline").rglob("*") if f.is_dir
 endef
 export FORGET
 
-.PHONY: all quick test check format lint types oracles axe bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
+.PHONY: all quick test check format lint types oracles axe approve bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
@@ -78,6 +78,9 @@ axe: ## install what tests judge the accessibility of a report with, where npm i
 
 bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s
+
+approve: $(READY_TO_TEST) ## keep the numbers and pages of the small study, after you have looked at what changed
+	$(BIN)/python -m pytest -q tests/contracts/test_approved.py --approve
 
 mutants: $(READY_TO_TEST) ## change the code in COUNT places, and see whether tests notice (SEED=n for others)
 	PYTHONPATH=pipeline $(BIN)/python -m tests.mutants --seed $(SEED) --count $(COUNT)

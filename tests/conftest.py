@@ -262,6 +262,7 @@ SLOW: dict[str, dict[str, int]] = {
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the longest studies, too")
+    parser.addoption("--approve", action="store_true", help="keep what there is now as what was approved")
     parser.addoption("--full", action="store_true", help="run benchmarks, at their full size")
 
 

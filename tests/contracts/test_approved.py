@@ -1,0 +1,100 @@
+"""The small study gives the numbers, the remarks and the pages that were looked at and approved.
+
+The other tests say what is right.  This one says what has changed: `make approve` writes what there is now, and the
+differences that the commit then shows are to be explained by it.  Numbers are compared within a millionth and a
+thousandth of their standard error, so that another processor changes none.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from davinci_forces.records import Diagnostic
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.report.content import Number
+from davinci_forces.report.results import collect
+from davinci_forces.report.sections import SECTIONS
+from tests.contracts.conftest import Lab
+from tests.contracts.test_sections import context, written
+
+APPROVED = Path(__file__).with_name("approved")
+AMPLIFIES_ROUNDING = "ekf-adaptive."  # a filter whose noise follows its own innovations
+BY_SOLVER = ("control.",)  # steps of an adaptive solver follow the last digits
+SHARE, SHARE_OF_STD, SHARE_BY_SOLVER = 1e-6, 1e-3, 1e-4
+ROWS = 4  # of a table that are compared
+
+
+def outline(x: Any, name: str = "") -> Iterator[str]:
+    """A page as lines: words, numbers as they are printed, and of curves the number of points and their range."""
+    if isinstance(x, Number):
+        yield f"{name}{x} {x.key or ''}".rstrip()
+    elif is_dataclass(x):
+        yield f"{name}{type(x).__name__}"
+        for field in fields(x):
+            value = getattr(x, field.name)
+            if value is not None and not (isinstance(value, str | tuple) and len(value) == 0):
+                yield from (f" {line}" for line in outline(value, f"{field.name}: "))
+    elif isinstance(x, np.ndarray):
+        yield f"{name}{span(x)}"
+    elif isinstance(x, tuple | list) and all(isinstance(part, str | int | float) for part in x):
+        yield f"{name}{' | '.join(f'{part:.4g}' if isinstance(part, float) else str(part) for part in x)}"
+    elif isinstance(x, tuple | list):
+        yield f"{name}{len(x)}"
+        for part in x[:ROWS] if name == "rows: " else x:
+            yield from (f" {line}" for line in outline(part))
+    else:
+        yield f"{name}{x:.4g}" if isinstance(x, float) else f"{name}{x}"
+
+
+def span(x: np.ndarray) -> str:
+    """The shape of an array, and its range to three digits."""
+    numbers = x[np.isfinite(x)] if x.dtype.kind in "fiu" else x[:0]
+    return f"{x.shape}" + (f" {numbers.min():.3g} to {numbers.max():.3g}" if numbers.size else "")
+
+
+@pytest.fixture(scope="module")
+def pages(lab: Lab, catalogue: Catalogue) -> str:
+    about = context(lab, catalogue)
+    sections = (written(name, about) for name in SECTIONS if name != "provenance")
+    return "\n".join(line for section in sections if section for line in outline(section)) + "\n"
+
+
+def compare(file: str, now: str, approve: bool) -> str:
+    """What was approved; now, if it is to be."""
+    place = APPROVED / file
+    if approve:
+        place.write_text(now, encoding="utf-8")
+    return place.read_text(encoding="utf-8")
+
+
+def test_numbers_are_those_that_were_approved(catalogue: Catalogue, pytestconfig: pytest.Config):
+    results = {key: [r.value, r.std] for key, r in collect(catalogue).items() if not key.startswith(AMPLIFIES_ROUNDING)}
+    lines = [f'"{key}": {json.dumps([x and float(f"{x:.9g}") for x in pair])}' for key, pair in results.items()]
+    now = "{\n" + ",\n".join(lines) + "\n}\n"
+    approved = json.loads(compare("numbers.json", now, pytestconfig.getoption("--approve")))
+    assert list(results) == list(approved)
+    changed = {}
+    for key, (value, std) in results.items():
+        share = SHARE_BY_SOLVER if key.startswith(BY_SOLVER) else SHARE
+        was, was_std = approved[key]
+        near = share * abs(was) + SHARE_OF_STD * (was_std or 0.0) + 1e-12
+        if not abs(value - was) <= near and not (np.isnan(value) and np.isnan(was)):
+            changed[key] = (value, was)
+        elif (std is None) != (was_std is None) or (std and not abs(std - was_std) <= SHARE_OF_STD * was_std):
+            changed[key] = (std, was_std)
+    assert not changed
+
+
+def test_remarks_are_those_that_were_approved(catalogue: Catalogue, pytestconfig: pytest.Config):
+    remarks = sorted((d.stage, d.subject, *map(str, d.text)) for d in catalogue.records(Diagnostic))
+    now = "\n".join(" | ".join(remark) for remark in remarks) + "\n"
+    assert now.splitlines() == compare("remarks.txt", now, pytestconfig.getoption("--approve")).splitlines()
+
+
+def test_pages_are_those_that_were_approved(pages: str, pytestconfig: pytest.Config):
+    assert pages.splitlines() == compare("pages.txt", pages, pytestconfig.getoption("--approve")).splitlines()
