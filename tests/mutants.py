@@ -1,8 +1,8 @@
 """Change the code in one place at a time, and see whether a test fails: `make mutants` (SEED=n, COUNT=n).
 
 A mutant is one operator, comparison or number of a module that is changed to another.  Test files that import the
-module run first, then those that import what imports it, up to `MAX_FILES`, and at last the slow tests of these files.
-A mutant that no test notices survives: either a test is missing, or the change is of no consequence.
+module run first, then those that import what imports it, up to `MAX_FILES`.  A mutant that no
+test notices survives: either a test is missing, or the change is of no consequence.
 """
 
 import argparse
@@ -116,16 +116,15 @@ def is_noticed(mutant: Mutant, tree: Path) -> str:
     whole = file.read_bytes()
     try:
         replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
-        for options in ([], ["--slow", "-m", "slow"]):
-            for test in tests_for(mutant):
-                command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *options, test]
-                environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(tree / "pipeline")}
-                try:
-                    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, timeout=TIMEOUT)
-                except subprocess.TimeoutExpired:
-                    return f"{test} (it does not end)"
-                if done.returncode not in (0, 5):
-                    return test
+        for test in tests_for(mutant):
+            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
+            environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(tree / "pipeline")}
+            try:
+                done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, timeout=TIMEOUT)
+            except subprocess.TimeoutExpired:
+                return f"{test} (it does not end)"
+            if done.returncode not in (0, 5):
+                return test
     finally:
         replace_source(file, whole)
     return ""

@@ -111,7 +111,7 @@ def blamed(theta, std, others=()) -> str:
 def test_an_inertia_that_was_not_excited_is_not_blamed_on_signs():
     said = blamed([-0.07, 0.01, 0.37, 0.22], [0.25, 0.01, 0.01, 0.01])
     assert "-0.07 ± 0.2 kg m^2 cannot be distinguished from 0, because the motion hardly excites it" in said
-    assert "accelerating more: `davinci-forces excite arm.toml hand_roll`" in said
+    assert "with larger accelerations: `davinci-forces excite arm.toml hand_roll`" in said
     assert "sign" not in said
 
 

@@ -190,6 +190,10 @@ def docstrings() -> Iterator[tuple[str, str]]:
                 yield f"{file.relative_to(PACKAGE).as_posix()}:{getattr(node, 'name', '')}", text
 
 
+def test_no_docstring_is_broken_like_a_text_in_code():
+    assert [place for place, text in docstrings() if re.search(r'"\n\s*"', text)] == []
+
+
 def test_no_sentence_of_a_docstring_is_long():
     lengths = [(words_in(s), place, s) for place, text in docstrings() for s in sentences(text)]
     long = sorted((row for row in lengths if row[0] > LONGEST_DOCSTRING_SENTENCE), reverse=True)

@@ -115,7 +115,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     atexit.register(ignore_signals)  # a signal that arrives while Python ends would end it without a message
     for number in STOP_SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN:  # ignored already in the background of a script
+        if signal.getsignal(number) != signal.SIG_IGN:  # unless ignored already, as in the background of a script
             signal.signal(number, stop)
     try:
         app()

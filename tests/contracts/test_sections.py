@@ -170,7 +170,7 @@ def test_each_effect_that_a_simulation_put_in_has_its_term_with_its_value_or_non
     assert {effect for effect, _ in rows} >= {effect for effect, _, _ in ground_truth.EFFECTS}
     for effect, _, terms in ground_truth.EFFECTS:
         taken = any(re.match(terms, name) for name in names)
-        assert taken != (rows.get((effect, terms.replace("|", ", "))) == "not taken")
+        assert taken != (rows.get((effect, terms.replace("|", ", "))) == "not in the model")
     assert rows["windings, limits of current and voltage", ground_truth.WITHOUT_TERM] == "–"
 
 
@@ -235,7 +235,7 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     assert said == (
         "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
         "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
-        "slide, too much to be believed; no 95 % band is too narrow."
+        "slide, too much to be believed; all 95 % bands are wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))

@@ -200,5 +200,7 @@ def test_the_table_of_thresholds_says_what_the_verdicts_do():
 
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
-    assert "no 95 % band is too narrow" not in verdict_sentence(None, [unjudged])
-    assert "no 95 % band is too narrow" in verdict_sentence(None, [replace(unjudged, space=free_space(coverage=0.95))])
+    assert "all 95 % bands are wide enough" not in verdict_sentence(None, [unjudged])
+    assert "all 95 % bands are wide enough" in verdict_sentence(
+        None, [replace(unjudged, space=free_space(coverage=0.95))]
+    )

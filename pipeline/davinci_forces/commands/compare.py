@@ -1,8 +1,8 @@
 """Compare the numbers of two reports: which changed, which were added and which were removed.
 
-A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If neither report has a standard error, it
-has changed if the relative difference exceeds 1e-9. A number with another unit has changed, too.
-The exit code is always 0.
+A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If the number has no standard
+error in either report, it has changed if the relative difference exceeds 1e-9. A number
+with another unit has changed, too. The exit code is always 0.
 """
 
 import json
@@ -28,7 +28,9 @@ def run(
     b: Annotated[Path, typer.Argument(help="The results.json or study to compare with it.")],
     reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     every: Annotated[bool, typer.Option("--all", help="List every change, not the ten largest of each joint.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print rows of key, a, b, std and z as JSON.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")
+    ] = False,
 ) -> None:
     """List what changed from A to B, joint by joint, the largest changes in standard errors first."""
     from davinci_forces.report.changes import changes

@@ -26,7 +26,9 @@ def run(
     harmonics: Annotated[int | None, typer.Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
     criterion: Annotated[
         str,
-        typer.Option(help="Minimise, of regressor F: `determinant` is -log10 det(F'F), `condition` is log10 cond(F)."),
+        typer.Option(
+            help="What to minimise, of regressor F: `determinant` is -log10 det(F'F), `condition` is log10 cond(F)."
+        ),
     ] = "determinant",
     q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
     dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,

@@ -28,7 +28,9 @@ def run(
     urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
     thesis: Annotated[
         bool,
-        typer.Option("--thesis", help="Print where each table, figure and equation of the thesis is (davinci only)."),
+        typer.Option(
+            "--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."
+        ),
     ] = False,
 ) -> None:
     """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.

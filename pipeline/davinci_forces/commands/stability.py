@@ -1,4 +1,4 @@
-"""Compute the stiffest tissue that any hand on a haptic device may feel, by formulas; needs no study.
+"""Compute the stiffest tissue at which a given hand on a haptic device is stable, by formulas; needs no study.
 
 The hand is a mass on a spring and a damper. The tissue is a spring that acts only below its surface, as in chapter 8
 of the thesis.

@@ -1,8 +1,8 @@
 """The response of a filter to a push, and the smallest random walk q_tau with which the filter follows a push.
 
 The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, and peaks no later than
-the setting `delay` after the push.  In this module `q_tau` is the random walk per sample, and `walk` is the random walk
-per square root of a second.
+the setting `delay` after the peak of the push.  `q_tau` of a `NoiseModel` is the random walk per sample; `walk` and the
+`q_tau` of a joint are per square root of a second.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ def smallest_q_tau(
 ) -> float:
     """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push within `delay` [s].
 
-    A filter without a random walk does not use `q_tau`, so the lowest value of the search range is returned.
+    A filter without a random walk does not use `q_tau`, so the search ends at one end of its range.
     """
     noise_effort = inertia * float(np.hypot(noise.q_dq, noise.r_dq)) / T_s
     low, high = (ratio * noise_effort for ratio in WALK_RANGE)

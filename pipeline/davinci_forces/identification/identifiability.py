@@ -13,7 +13,7 @@ from davinci_forces.robots.robot import Joint, Robot
 MIN_CORRELATION = 0.95  # two parameters are reported as correlated from this correlation on
 MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than the best one is reported
 MIN_PART_NAMED = 0.1  # a combination is reported with the parameters whose squared component is at least this
-MIN_Z = 2.0  # ratio of a parameter to its standard error due to noise; a smaller one is not significant
+MIN_Z = 2.0  # ratio of a parameter to its standard error; a smaller one is not significant
 MIN_R2 = 0.5  # a model that explains less of the effort's variance hardly describes the effort
 
 
@@ -36,8 +36,8 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
 def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]:
     """Describe parameters whose estimates noise alone could explain, with an upper bound of their effort.
 
-    The test takes the error due to noise alone: the data determine a parameter that passes it, though other terms of
-    the model may change its value.  The upper bound takes both parts of the error.
+    They are compared with their error due to noise alone.  Other terms of the model may change a parameter, too, but
+    then the data do determine it.  The upper bound takes both parts of the error.
     """
     noise_std = estimate.standard_errors.noise
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
@@ -77,7 +77,7 @@ def why_not_positive(
     if value > -MIN_Z * std:
         text = f"{inertia} cannot be distinguished from 0, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
-        return f"{text}; record the joint {by_itself}accelerating more: {excite_command(robot, joint)}"
+        return f"{text}; record the joint {by_itself}with larger accelerations: {excite_command(robot, joint)}"
     friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
     negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and negative_friction.sum() * 2 >= friction.sum():

@@ -107,8 +107,7 @@ class Sampling:
     step: float  # [s] sampling time
 
     def is_like(self, sampling: "Sampling", has_x_columns: bool) -> bool:
-        """Whether the header says that both were sampled together; X0 and step do not count if the file has X "
-        "columns."""
+        """Whether the header says that both were sampled together; X0 and step are ignored if it has X columns."""
         if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not has_x_columns):
             return False
         start, other_start = self.start, sampling.start
@@ -128,7 +127,7 @@ class OwnClock:
 
 
 def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has_x_columns: bool) -> list[list[str]]:
-    """Split each group whose channels have different clocks by a further header; add channels that are in no group."""
+    """Split groups in which a second header states different clocks for the channels; add channels without a group."""
     split: list[list[str]] = []
     for group in groups:
         parts: list[list[str]] = []
@@ -151,7 +150,7 @@ def _add_to_group(groups: list[list[str]], name: str, sampled: dict[str, Samplin
 
 
 def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
-    """Group columns with equal values in all rows, as columns of times of one clock; missing values are equal."""
+    """Group columns that are equal in all rows, such as the times of one clock; missing values count as equal."""
     groups = [[*names]]
     for block in blocks:
         split: list[list[str]] = []

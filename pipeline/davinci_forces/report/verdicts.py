@@ -235,7 +235,7 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          "beyond, or the joints contradict each other", "–"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Estimates of a simulated study",
-         "probability, if the errors are right, that as few or fewer lie within 2 (and within 4) of them",
+         "probability of so few within 2 (or 4) standard errors of the truth, if the errors are right",
          f"at least {percent(UNLIKELY)}", "–", "below"),
         ("White noise", "p-value of the Ljung-Box test over 20 lags", "above 1 %", "–", "–"),
         ("Innovations of the filter", "p-values of this test and of the cumulative periodogram, both signals",

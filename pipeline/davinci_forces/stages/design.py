@@ -1,5 +1,4 @@
-"""Compute what needs no logs: the robot's geometry and workspace, simulated controllers, and excitation "
-"trajectories."""
+"""Compute what needs no logs: geometry, workspace, simulated controllers and excitation trajectories."""
 
 from collections.abc import Iterator
 from itertools import product

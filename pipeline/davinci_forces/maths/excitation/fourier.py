@@ -10,9 +10,9 @@ The run-in leads from a standstill into the trajectory along the same path, slow
 
     q(sigma(t)),    dq sigma',    ddq sigma'^2 + dq sigma'',    sigma' = 10 u^3 - 15 u^4 + 6 u^5,    u = 1 + t / T
 
-over -T <= t <= 0.  sigma' rises from 0 to 1 with sigma'' = 0 at both ends, so position, velocity and acceleration are
-continuous, as is jerk.  Positions and velocities keep every limit that the periodic trajectory keeps; accelerations
-keep their limits if T is long enough.
+over -T <= t <= 0.  sigma' rises from 0 to 1 with sigma'' = sigma''' = 0 at both ends, so position, velocity,
+acceleration and jerk are continuous.  Positions and velocities keep every limit that the periodic trajectory
+keeps; accelerations keep their limits if T is long enough.
 """
 
 from collections.abc import Callable, Sequence
@@ -74,9 +74,9 @@ def instants(period: float, samples: int = PERIOD_SAMPLES) -> Array:
 def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
     """The times [s] within a period at which position, velocity and acceleration may be extreme: 2 N_f + 1 of each.
 
-    Multiplied by z^N, z = exp(i omega t), the derivative of a trigonometric polynomial is a polynomial in z.  Its roots
-    on the unit circle are the extrema.  The angles of *all* roots are returned: rounding may move a double root off the
-    circle.  Additional angles do no harm, since a value of the series at any angle lies within its range.
+    Multiplied by z^N_f, z = exp(i omega t), the derivative of a trigonometric polynomial is a polynomial in z.  Its
+    roots on the unit circle are the extrema.  The angles of *all* roots are returned: rounding may move a double root
+    off the circle.  Additional angles do no harm, since a value of the series at any angle lies within its range.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
@@ -192,7 +192,7 @@ KeepsLimits = Callable[[Array, Array, Array], bool]  # of a motion (K, n), for l
 def shortest_run_in(
     series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array, keeps_limits: KeepsLimits | None = None
 ) -> float | None:
-    """The first of `durations` [s] for which the run-ins of all series keep their limits of acceleration, or None.
+    """The first of the ascending `durations` [s] for which all run-ins keep their limits of acceleration, or None.
 
     If a series itself exceeds the limits, its run-in may reach the accelerations of the series.  `keeps_limits`
     may set limits to the motion of all series together.

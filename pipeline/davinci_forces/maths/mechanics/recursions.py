@@ -7,7 +7,8 @@ The same source runs on numpy arrays and in compiled loops (`kernels`).  The las
 In compiled code `samples` is `range(S)`; in numpy it has one element, a slice of all samples.  `joints` (n + 1, 5, S)
 has cos q, sin q, q, dq, ddq of each coordinate.  Its last row is 0, for links that no coordinate moves: they count as
 sliding by 0, so cos q and sin q are not used.  `scratch` (bodies, numbers, S) has the intermediate results of every
-body: the base is body 0, link i is body i + 1.  The caller sets it to 0 before its first use.
+body: the base is body 0, link i is body i + 1, and `tree.parent[i]` is a number of a body.
+The caller sets it to 0 before its first use.
 """
 
 from collections.abc import Iterable

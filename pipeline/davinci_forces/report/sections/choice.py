@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Choice, ModelSearch, Prediction
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
@@ -48,10 +48,12 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on four or more "
         "of the six parts of the path. The model after the earliest step whose error is within one standard error of "
         "the least is taken. Then joints share the links' parameters, unless that is clearly "
-        "worse; else each joint keeps its own (“joint by joint”). Of the candidates with fixed terms, the simplest "
+        "worse; then each joint keeps its own (“joint by joint”). Of the candidates with fixed terms, the simplest "
         "that is not clearly worse than the best is taken. The searched model replaces it if its error is lower."
     )
-    yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
+    why = choice.why.removeprefix(choice.chosen)  # the choice is named once
+    it = "It" if why != choice.why else ""
+    yield Verdict("info", f"**Chosen: “{literal(choice.chosen)}”.** {it}{literal(why)}.")
     caption = "The best candidate of each structure and added friction."
     yield table(context, choice, best_rows(choice), caption, "choice-table")
     yield from search_tables(context)
@@ -142,7 +144,7 @@ def unseen(context: Context) -> Iterator[Block]:
         (
             literal(p.log),
             title(p.joint),
-            p.path.removesuffix(" path"),
+            "fitted" if p.path == SAME_PATH else "new",
             context.number(f"{p.prefix}.relative_error", 3),
             context.number(f"predict.{p.log}.{p.joint}.independent.lse.relative_error", 3),
         )

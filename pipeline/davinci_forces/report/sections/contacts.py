@@ -44,8 +44,9 @@ def blocks(context: Context) -> Iterator[Block]:
             "external effort), mean and impulse (effort times time) are taken over the whole window. Their standard "
             "errors are their spread over windows of the same length in free space. The standard error of a peak also "
             "includes the smoother's standard deviation there, and the height by which smoothing flattens the peak. "
-            "The standard error of a mean also includes the effort that smoothing moves out of the window. The lower "
-            "detection level judges peaks: 99 % of the samples of the joint's worst run in free space stay below it."
+            "The standard error of a mean also includes the effort that smoothing moves out of the window. Peaks are "
+            "judged by the detection level, which is lower: 99 % of the samples of the joint's worst run in free space "
+            "stay below it."
         )
         yield peaks(contacts)
         yield Table(

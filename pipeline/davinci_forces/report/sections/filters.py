@@ -45,10 +45,10 @@ def blocks(context: Context) -> Iterator[Block]:
         "The filter assumes noise of position, velocity and effort. The standard deviations of this noise maximise the "
         "likelihood of the innovations (each measurement minus its prediction) in identification logs, where nothing "
         "touches the robot. The external effort is modelled as a random walk. Identification logs cannot show how fast "
-        "the external effort may change: a filter tuned to them would miss pushes. So a push decides, a half-sine of 1 "
-        "s. The random walk is the slowest with which the filter shows 90 % of the peak of this push, at most "
-        f"{context.study.settings.delay:g} s late ([@filter-tuning]). A longer `delay` in the settings of study.toml "
-        "lowers the filter's noise."
+        "the external effort may change: a filter tuned to them would miss pushes. So a test push decides, a half-sine "
+        "of 1 s. The random walk is the smallest with which the filter shows 90 % of the peak of this push, at most "
+        f"{context.study.settings.delay:g} s late ([@filter-tuning]). With a longer `delay` in study.toml the estimate "
+        "is less noisy."
     )
     yield tuning(context, noises)
     worst = [track for noise in noises for track in worst_track(context, noise.joint)]
@@ -101,11 +101,11 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     keys = ("effort", "smooth_part"), ("ekf", "model_part"), ("effort", "free_rms"), ("effort", "coverage")
     over_logs = ("coverage", "band_width")
     rows = tuple((*run_row(context, t, keys), *context.numbers(f"band.{t.joint}", over_logs, 2)) for t in tracks)
-    header = ("Joint", "Worst free run", "Smoother", "Model", "RMS", "Coverage", "Over logs", "Half-width")
+    header = ("Joint", "Worst free run", "Smoother", "Model", "RMS", "Coverage", "Mean coverage", "Half-width")
     return Table(
         "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
         "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
-        "Over logs: the mean coverage of all logs that were not fitted, with its standard error over logs (with "
+        "Mean coverage: of all logs that were not fitted, with its standard error over logs (with "
         "fewer than 3 logs, over blocks of time). Half-width: the mean half-width of the bands of these logs.",
         header,
         rows,
@@ -127,8 +127,8 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
     return Table(
         "The cost of real time. The report's results are those of the smoother, which uses samples before and after "
         "each instant. In real time only the filter is available. RMS and level: RMS and detection level in free "
-        "space. Delay: of the peak of a push of 1 s by the filter. Lag error: the part of the filter's standard "
-        "deviation that its lag makes.",
+        "space. Delay: of the filter's peak after that of a push of 1 s. Lag error: the standard deviation that the "
+        "filter's lag causes.",
         (
             "Joint",
             "Worst free run",

@@ -32,9 +32,9 @@ PUSH_SHAPES = {
 # What the simulator puts into a joint: the effect, its parameters in truth.toml, and the terms that represent it.
 EFFECTS = (
     ("viscous friction", "{viscous:g}", "viscous friction"),
-    ("Coulomb friction, up; down", "{coulomb_up:g}; {coulomb_down:g}", "Coulomb friction|offset"),
+    ("Coulomb friction, positive; negative", "{coulomb_up:g}; {coulomb_down:g}", "Coulomb friction|offset"),
     (
-        "Stribeck: static friction, up; down; velocity",
+        "Stribeck: static friction, positive; negative; velocity",
         "{static_up:g}; {static_down:g}; {stribeck_velocity:g}",
         "Stribeck friction",
     ),
@@ -86,7 +86,7 @@ def effects(context: Context) -> Iterator[Table]:
             keys = dict(used_parameters(context, joint))
             for effect, symbols, terms in EFFECTS:
                 of_effect = [(term, context.number(key, 3)) for term, key in keys.items() if re.match(terms, term)]
-                cells = of_effect or [(terms.replace("|", ", "), "not taken")]
+                cells = of_effect or [(terms.replace("|", ", "), "not in the model")]
                 rows += [(title(joint), effect, symbols.format(**parameters), *cell) for cell in cells]
     if rows:
         rows.append(("Motors", "rotor inertia", "see truth.toml", "part of the inertia", "–"))

@@ -28,7 +28,7 @@ FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact or reversals",
     "mended": "white once tested causes are removed",
-    UNEXPLAINED: "not white even without all tested causes",
+    UNEXPLAINED: "not white even with all tested causes removed",
 }
 PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
@@ -42,7 +42,6 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The section's content."""
-    assumed = "; [@filter-assumptions] has its size" if context.catalogue.records(Track) else ""
     yield Prose(
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
@@ -50,10 +49,10 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
         "combinations, until the tests pass. To remove contact or reversals, their samples are left out. The random "
         "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
-        "replaced by their maximum-likelihood estimate for this log. A cause is named as the whole cause only if the "
-        "tests pass without it, with p-values at least a hundred times larger, and fail if as many samples are left "
-        "out elsewhere. Otherwise the share of the correlation that it explains is stated. "
-        f"The filter's random walk is chosen to follow pushes{assumed}. In free motion this walk is larger than "
+        "replaced by their maximum-likelihood estimate for this log. A cause is named as the whole cause if, "
+        "once it is removed, the tests pass with p-values at least a hundred times larger. They must fail if as many "
+        "samples are left out elsewhere. Of other causes the share of the correlation is stated. "
+        "The filter's random walk is chosen to follow pushes. In free motion this walk is larger than "
         "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
     )
     yield verdicts(context, explained)

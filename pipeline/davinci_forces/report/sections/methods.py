@@ -128,8 +128,9 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "crossing rate", "detection"),
     )),
     (records.Weight, (
-        Prose("**Weighing.** A mass is fitted to the external efforts of all joints that carry it. The means over the "
-              "run are subtracted on both sides, and with them a day's offset. The standard error of the mass combines "
+        Prose("**Weighing.** A mass is fitted to the external efforts of all joints that carry it. If the "
+              "data can separate a day's offset from the load, the means over the run are subtracted on both sides, "
+              "and the offset with them. The standard error of the mass combines "
               "the jackknife over sixths of the path with the error of the fit. It is larger if logs without a mass "
               "show one (Birge, 1932)."),
         Equation('hat(m)_L = (sum_r c_r^T tau_("ext",r) \\/ epsilon_r^2) / (sum_r c_r^T c_r \\/ epsilon_r^2)',
@@ -138,8 +139,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
     )),
     (records.TorqueConstant, (
         Prose("**Torque constant.** The constant in use is scaled until the joint alone gives the known mass. The "
-              "variance of the result is the mean of two jackknife variances, of the run and of free motion. The "
-              "factor of Student's t widens its interval."),
+              "variance of the result is the mean of two jackknife variances, of the run and of free motion. A "
+              "95 % interval takes the factor of Student's t."),
         Equation('hat(K)_m = K_m m_L \\/ hat(m)_L',
                  "the torque constant: the one in use times the known mass over the apparent one", "torque-constant"),
     )),

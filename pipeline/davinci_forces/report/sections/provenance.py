@@ -34,8 +34,8 @@ def blocks(context: Context) -> Iterator[Block]:
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
     yield Prose(
-        "Settings used, defaults included. `harmonics` = 0 takes the robot's number. `q_tau` is the intensity of the "
-        "random walk; 0 takes the computed one:"
+        "Settings used, defaults included. `harmonics` = 0 takes the robot's number, and `q_tau` = 0 the computed "
+        "random walk; `effort` has the efforts that the study seeks:"
     )
     settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
     yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
@@ -45,7 +45,9 @@ def blocks(context: Context) -> Iterator[Block]:
     number = len(provenance.processed)
     yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
     if number:
-        yield OnScreen("Processed files of each kind; kinds without input data", "made", (record_counts(provenance),))
+        yield OnScreen(
+            "Processed files of each kind of record; kinds without input data", "made", (record_counts(provenance),)
+        )
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)

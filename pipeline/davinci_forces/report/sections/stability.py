@@ -85,8 +85,8 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
         words = f"**not stable** against the measured tissue, {tissue}; a damping of {needed} is needed"
     return Verdict(
         "good" if stable else "warn",
-        f"Hand “{name}”: {words}. Elastic tissue may have up to {headline}. With friction of the arm and damping of "
-        f"the tissue, simulation finds {settles}.",
+        f"Hand “{name}”: {words}. Feedback is stable on elastic tissue of up to {headline}. With friction of the arm "
+        f"and damping of the tissue, simulation finds {settles}.",
     )
 
 
@@ -114,9 +114,9 @@ def without_delay(context: Context) -> str:
         "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; see "
         "[@stability-limits]. This function covers tissue that switches at any time, but neither delay nor sampling. "
         f"In {region} no such function exists, which proves nothing about real tissue. Real tissue acts only in "
-        "contact. Then $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$, if the force "
-        "comes at once. So delay and sampling set the limit, not switching. `davinci-forces stability` also solves the "
-        "linear matrix inequality of the function."
+        "contact. Then $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls at the rate $b dot(x)^2$, if the "
+        "force comes at once. So delay and sampling set the limit, not switching. `davinci-forces stability` also "
+        "solves the linear matrix inequality of the function."
     )
 
 
@@ -125,9 +125,9 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
     keys = [f"stability.{limit.hand}" for limit in limits]
     rows = tuple((name, *(context.number(f"{key}.{field}", 3) for key in keys), what) for field, name, what in ROWS)
     return Table(
-        "Limits of the tissue's stiffness, and what they follow from. The standard error of the first includes those "
-        "of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's parameters. A dash marks "
-        "a limit that was not found, or an error that is not known.",
+        "Limits of the tissue's stiffness, and what they follow from. The standard error of the formula's limit "
+        "includes those of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's "
+        "parameters. A dash marks a limit that was not found, or an error that is not known.",
         ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes"),
         rows,
         "stability-table",
@@ -155,7 +155,7 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
     for limit in context.catalogue.records(StabilityLimit):
         top = np.full(len(limit.k_h), limit.k_t_switching.max())
         marks.append(Band(limit.k_h, limit.k_t_cqlf, top, beyond, "vermillion"))
-        marks.append(Line(limit.k_h, limit.k_t_cqlf, "exact limit", "black", "solid"))
+        marks.append(Line(limit.k_h, limit.k_t_cqlf, "Lyapunov function", "black", "solid"))
         marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
     return Panel(
         "Without delay",

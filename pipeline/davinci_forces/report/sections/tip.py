@@ -103,8 +103,8 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
     return Table(
         "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
-        "in the direction in which it is largest, and this direction. A window may be marked: “found” is not stated by "
-        "the study, and “near singular” is a pose in which the force is uncertain.",
+        "along the least certain direction, which is the last column. “Found” marks a window that the study does not "
+        "state, “near singular” a pose in which the force is uncertain.",
         ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction"),
         rows,
         "tip-contacts",

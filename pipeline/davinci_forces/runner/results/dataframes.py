@@ -62,13 +62,12 @@ def as_frame(record: Record) -> pd.DataFrame:
 
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
-    """Map each field to its unit; where a unit differs between joints, to a dictionary from joint (or group) to "
-    "unit."""
-    units_by_joint: dict[str, dict[str, str]] = {}
+    """Map each field to its unit; if units differ, to a dictionary from joint (or group) to unit."""
+    units_of_field: dict[str, dict[str, str]] = {}
     for record in records:
         for name, unit in record.origin.units.items():
-            units_by_joint.setdefault(name, {})[getattr(record, "joint", getattr(record, "group", ""))] = unit
+            units_of_field.setdefault(name, {})[getattr(record, "joint", getattr(record, "group", ""))] = unit
     return {
         name: by_joint if len(set(by_joint.values())) > 1 else next(iter(by_joint.values()))
-        for name, by_joint in units_by_joint.items()
+        for name, by_joint in units_of_field.items()
     }

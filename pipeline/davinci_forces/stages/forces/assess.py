@@ -1,4 +1,4 @@
-"""Compute two levels from free motion: the alarm level finds contacts, the lower detection level judges their peaks."""
+"""Compute two levels from free motion: contacts are found above the alarm level, and the other judges their peaks."""
 
 from collections.abc import Iterable, Iterator
 

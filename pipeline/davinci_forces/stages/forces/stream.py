@@ -1,4 +1,4 @@
-"""Compare the smoother with a filter that gets samples as they arrive, as in real time; filters recorded logs."""
+"""Filter recorded logs as if their samples arrived one by one, and compare with the smoother."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 

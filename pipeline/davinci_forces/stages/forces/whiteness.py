@@ -1,5 +1,4 @@
-"""Test whether residuals and innovations are white noise, and find the causes where the filter's innovations are "
-"not."""
+"""Test whether residuals and innovations are white noise, and find out why innovations are not white."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 

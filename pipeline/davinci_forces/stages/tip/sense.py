@@ -1,5 +1,4 @@
-"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of the 95 % "
-"band."""
+"""Compare the estimated force with the force sensor of a log: error, lag and coverage of the 95 % band."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple

@@ -98,9 +98,9 @@ def caption(contacts: list[Contact]) -> str:
     """The caption of the figure."""
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
-        return f"External effort on each joint in its worst run that was not fitted. {level}"
-    which = "the largest model error, of those in which only this joint is touched if there are any"
-    return f"External effort on each joint, contact windows shaded. The log is the one with {which}. {level}"
+        return f"External effort of each joint in its worst run that was not fitted. {level}"
+    which = "Of the logs in which only this joint is touched (else of all), that with the largest model error is shown."
+    return f"External effort of each joint, contact windows shaded. {which} {level}"
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -122,7 +122,8 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     if not windows:
         return f"{text} No contact is measured, as the study states no contact windows."
     found = f"In {above} of {count(windows, 'contact')}"
-    return f"{text} A contact is one window on one joint. **{found}, the effort exceeds the detection level.**"
+    counted = "A window counts as a contact for every joint on which it is measured."
+    return f"{text} {counted} **{found}, the effort exceeds the detection level.**"
 
 
 def efforts_in_words(context: Context) -> str:
@@ -200,10 +201,11 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     return Table(
-        "Trust in the estimates. New path: share of the run's path that no fitted path explains. Model error: RMS of "
-        "measured minus modelled effort, without noise. Error/effort: model error over the RMS of the measured effort; "
-        "$R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space "
-        "samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error.",
+        "Trust in the estimates. New path: share of the run's motion that is unlike any fitted path. Model error: RMS "
+        "of measured minus modelled effort, without noise. Error/effort: model error over the RMS of the measured "
+        "effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
+        "free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
+        "",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",

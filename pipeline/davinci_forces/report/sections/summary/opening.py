@@ -39,7 +39,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
     which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
-        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["no 95 % band is too narrow"]
+        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["all 95 % bands are wide enough"]
     text = "; ".join(parts) or "no effort was estimated in free space"
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -90,7 +90,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
         level = stiffness_level(log, context.true_stiffness(log.log))
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
         quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
-        used = f" ({log.pushes} of {len(log)} pushes in contact)"
+        used = f" ({log.pushes} pushes used, of {len(log)} with contact)"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
 
