@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import nnls
+from scipy.optimize import brentq, nnls
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
@@ -130,3 +130,34 @@ def test_weights_that_are_not_numbers_are_refused():
 def test_weights_of_three_periods_are_refused():
     with pytest.raises(NotIdentifiable, match="at least 4 periods in every log, and one holds 3"):
         estimator("wlse")(replace(problem(seed=1), periods=np.full(K, 3)))
+
+
+def paule_mandel(p: Regression, weight: np.ndarray) -> np.ndarray:
+    """Parameters by weights with the one constant variance that makes the residuals as large as stated."""
+    R = factorise(p, weight)
+    squares, degrees = (p.tau - p.Phi @ R.theta) ** 2, len(weight) - len(R.y)
+    s2 = brentq(lambda s2: (squares / (1 / weight + s2)).sum() - degrees, 0.0, 1e6, xtol=1e-14, rtol=1e-14)
+    return factorise(p, 1 / (1 / weight + s2)).theta
+
+
+@pytest.mark.parametrize(("excess", "is_model_error"), [(-0.2, False), (0.15, False), (0.27, True), (0.6, True)])
+def test_an_excess_of_three_standard_errors_is_the_model_s_error(excess, is_model_error):
+    """With 396 degrees of freedom, three standard errors of the squares are a fifth of them."""
+    p = problem(seed=4, sigma=0.2 * np.where(np.arange(K) < K // 2, 1.0, 0.3))
+    weight = p.periods / pool_variance(p.tau_var, p.periods)
+    residual = p.tau - p.Phi @ factorise(p, weight).theta
+    degrees = K - p.Phi.shape[1]
+    assert 3.0 * np.sqrt(2.0 / degrees) == pytest.approx(0.21, abs=0.01)
+    p = replace(p, tau_var=p.tau_var * (weight * residual**2).sum() / degrees / (1.0 + excess))
+    weight = p.periods / pool_variance(p.tau_var, p.periods)
+    expected = paule_mandel(p, weight) if is_model_error else factorise(p, weight).theta
+    assert_allclose(estimator("wlse")(p).theta, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("periods", [np.full(41, 5), np.full(41, 300), 5 + np.arange(41) % 3])
+def test_a_variance_is_pooled_over_the_fewest_neighbours_that_have_200_degrees(periods):
+    var = np.random.default_rng(1).chisquare(4, size=41)
+    half = min(int(np.ceil(200 / np.median(periods - 1))) // 2, 20)
+    around = [np.arange(k - half, k + half + 1) % 41 for k in range(41)]
+    expected = [np.average(var[near], weights=(periods - 1)[near]) for near in around]
+    assert_allclose(pool_variance(var, periods), expected, rtol=1e-12)

@@ -566,6 +566,13 @@ def test_a_stuck_sensor_a_saturated_drive_and_a_wrong_unit_are_said():
     assert "check the unit of the position" in in_mrad
 
 
+def test_positions_beyond_twenty_times_the_limits_are_in_another_unit():
+    far = np.quantile(np.abs(arm.signal("hand_roll", rate=100.0, periods=2).q), 0.99) / 0.6
+    for times, is_said in ((19.0, False), (21.0, True)):
+        said = remarked(lambda c, by=times / far: c.update(q=by * c["q"], dq=by * c["dq"]))
+        assert ("check the unit of the position" in said) == is_said
+
+
 @pytest.mark.slow
 def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
     """A log whose velocity is in other units than it says is remarked on, and the rest comes out as without it."""
