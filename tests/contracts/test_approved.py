@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from davinci_forces.records import Diagnostic
+from davinci_forces.records import KINDS, Diagnostic, Record
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.content import Number
 from davinci_forces.report.results import collect
@@ -89,6 +89,37 @@ def test_numbers_are_those_that_were_approved(catalogue: Catalogue, pytestconfig
             std and not abs(std - was_std) <= max(share, SHARE_OF_STD) * was_std
         ):
             changed[key] = (std, was_std)
+    assert not changed
+
+
+def sizes(record: Record) -> Iterator[tuple[str, list[float]]]:
+    """The mean and the root mean square of each field of a record that holds numbers."""
+    for name in (*record.scalars(), *record.columns()):
+        value = getattr(record, name)
+        x = np.asarray(value) if isinstance(value, int | float | tuple | np.ndarray) else np.array(["text"])
+        x = x[np.isfinite(x)].astype(float) if x.dtype.kind in "fiub" else x[:0]
+        if x.size:
+            yield name, [float(x.mean()), float(np.sqrt((x**2).mean()))]
+
+
+def test_records_are_those_that_were_approved(catalogue: Catalogue, pytestconfig: pytest.Config):
+    numbers: dict[str, list[list[float]]] = {}
+    for kind in KINDS.values():
+        for record in catalogue.records(kind):
+            adaptive = "-adaptive" if "ekf-adaptive" in record.key else ""
+            for name, pair in sizes(record):
+                numbers.setdefault(f"{kind.folder()}{adaptive}.{name}", []).append(pair)
+    lines = [f'"{key}": {[[float(f"{x:.7g}") for x in pair] for pair in pairs]}' for key, pairs in numbers.items()]
+    approved = json.loads(
+        compare("records.json", "{\n" + ",\n".join(lines) + "\n}\n", pytestconfig.getoption("--approve"))
+    )
+    assert {key: len(pairs) for key, pairs in numbers.items()} == {key: len(pairs) for key, pairs in approved.items()}
+    changed = {}
+    for key, pairs in numbers.items():
+        share = 0.05 if "-adaptive" in key else 1e-4 if key.startswith(("control.", "lyapunov.")) else 1e-5
+        for (mean, rms), (was_mean, was_rms) in zip(pairs, approved[key], strict=True):
+            if max(abs(mean - was_mean), abs(rms - was_rms)) > share * was_rms + 1e-12:
+                changed[key] = (mean, rms), (was_mean, was_rms)
     assert not changed
 
 
