@@ -47,6 +47,7 @@ from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.results import collect
 from davinci_forces.robots.robot import Joint
 from davinci_forces.runner import ALL
+from davinci_forces.runner.console import show_markdown
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import AttachedMass, LogEntry, Settings, reading
@@ -364,6 +365,16 @@ def test_pages_that_are_made_have_every_field_name_and_robot_once():
     assert "BadRequest" in pages["api"]
     assert re.findall(r"^## (\w+)$", pages["robots"], re.M) == list(robots.ROBOTS)
     assert "hand_roll" in pages["robots"]
+
+
+def test_no_page_loses_a_word_on_a_narrow_terminal(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    for page in guide.pages():
+        show_markdown(page.as_text)
+        shown = "".join(capsys.readouterr().out.split())
+        for name in re.findall(r"^\| `(\w+)` \|", page.text, re.M):
+            assert name in shown or len(name) > 12, (page.topic, name)
+        assert shown.count("…") == page.text.count("…"), page.topic
 
 
 def test_the_readme_is_two_screens_to_the_first_result_and_not_much_more():

@@ -17,7 +17,7 @@ LAG = 3  # samples before and after: a low-pass does not correlate noise over th
 
 
 def estimate(problem: Regression) -> Estimate:
-    """theta = (Z' Phi)^-1 Z' tau with instruments Z_k = (Phi_(k-3) + Phi_(k+3)) / 2; each log is a period.
+    """theta = (Z' Phi)^-1 Z' tau with instruments Z_k = Phi_(k-3) + Phi_(k+3); each log is a period.
 
     Raises
     ------
@@ -38,6 +38,6 @@ def estimate(problem: Regression) -> Estimate:
 
 
 def instruments(problem: Regression) -> Array:
-    """Return Z (K, p), the mean regressor `LAG` samples before and after."""
+    """Return Z (K, p), the sum of the regressors `LAG` samples before and after; their scale has no effect."""
     parts = np.split(problem.Phi, problem.starts[1:])
-    return np.concatenate([(np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0)) / 2.0 for part in parts])
+    return np.concatenate([np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0) for part in parts])

@@ -2,10 +2,10 @@
 
 import atexit
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import typer
 
@@ -85,6 +85,18 @@ def echo(text: str, err: bool = False, **style: Any) -> None:
 def show_markdown(text: str) -> None:
     """Print Markdown, laid out for the width of the terminal; a pipe gets the same without colours."""
     from rich.console import Console as Terminal
-    from rich.markdown import Markdown
+    from rich.markdown import Markdown, TableElement
 
-    Terminal().print(Markdown(visible(text, "\n\t")))
+    class Folded(TableElement):
+        """A table that is too wide breaks its words instead of cutting them."""
+
+        def __rich_console__(self, *about: Any) -> Iterator[Any]:
+            for table in super().__rich_console__(*about):
+                for column in table.columns:  # type: ignore[union-attr]
+                    column.overflow = "fold"
+                yield table
+
+    class Page(Markdown):
+        elements: ClassVar = Markdown.elements | {"table_open": Folded}
+
+    Terminal().print(Page(visible(text, "\n\t")))
