@@ -153,6 +153,13 @@ def test_logs_without_a_sensor_or_without_joints_are_passed_over():
     assert not sensed(touch(PUSH), channels=())
 
 
+def test_the_size_of_a_tiny_force_is_its_length_with_the_variance_along_it():
+    f, C = 1e-5 * np.array([[3.0, 0.0, 4.0], [0.0, 0.0, 0.0]]), np.diag([1.0, 2.0, 3.0])[None] + np.zeros((2, 1, 1))
+    force = sense.size(sense.EstimatedForce(np.arange(2.0), f, C, np.ones(2, bool)))
+    assert_allclose(force.f[:, 0], [5e-5, 0.0])
+    assert_allclose(force.C[:, 0, 0], [0.36 * 1.0 + 0.64 * 3.0, 1.0])  # that of x0 where there is no direction
+
+
 def test_samples_near_a_singular_pose_are_not_judged():
     estimate = tip(efforts(ROBOT, PUSH))
     near = replace(estimate, near_singular=(T > 20.0).astype(np.int64))

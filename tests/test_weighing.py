@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import chdtri
 
 from davinci_forces.maths.contact.weighing import (
     MIN_AGREEMENT,
@@ -499,3 +500,12 @@ def test_the_error_of_a_mass_pools_the_run_with_free_motion_and_widens_by_what_t
 
 def test_a_constant_with_which_the_mass_is_twice_the_known_one_is_twice_too_large():
     assert scaled_constant(0.08, 0.2, MassEstimate(0.4, 0.04)) == pytest.approx(Constant(0.04, 0.004))
+
+
+@pytest.mark.parametrize(("probability", "widens"), [(0.02, False), (0.009, True)])
+def test_masses_contradict_each_other_below_a_probability_of_one_percent(probability, widens):
+    apart = float(chdtri(1, probability)) ** 0.5  # of two masses of equal errors, in errors of their difference
+    [low, high] = [MassEstimate(0.1, 0.01), MassEstimate(0.1 + apart * 0.01 * 2**0.5, 0.01)]
+    found = agreement([low, high])
+    assert found.probability == pytest.approx(probability, rel=1e-9)
+    assert found.ratio == pytest.approx(apart if widens else 1.0)
