@@ -1,6 +1,7 @@
 """Contacts and the free space that they are judged by, on efforts whose peak, mean and level are known."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -386,3 +387,13 @@ def test_the_pdf_prints_the_contacts_that_are_largest_beside_their_joints_level(
 def test_the_interval_of_a_peak_is_95_percent():
     assert interval(Number(-2.0, "N", std=0.1)) == "−2.20 to −1.80"
     assert interval(Number(-2.0, "N")) == interval("–") == "–"
+
+
+@pytest.mark.parametrize(("dip", "contacts"), [(0.8, 1), (0.1, 2), (-1.0, 3)])
+def test_two_peaks_are_one_contact_unless_the_effort_falls_between_them(dip, contacts):
+    """The level is crossed between them in any case, and a push to the other side is another contact."""
+    corners = [(0.0, 0.0), (3.0, 0.0), (4.0, 1.0), (5.0, dip), (6.0, 1.0), (7.0, 0.0), (10.0, 0.0)]
+    x = np.interp(T, *zip(*corners, strict=True))
+    found = list(events(T, x, np.full(len(T), 0.01), 0.9, rise=0.0))
+    assert len(found) == contacts
+    assert all(a.release <= b.onset + 1e-9 for a, b in pairwise(found))

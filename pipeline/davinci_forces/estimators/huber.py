@@ -46,7 +46,7 @@ def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
         residual = root * (problem.tau - problem.Phi @ theta)
         deviation = MAD_TO_STD * float(np.median(np.abs(residual[weight > 0])))
         off = residual / max(deviation, tolerance / np.sqrt(len(residual)))
-        share = np.minimum(1.0, HUBER_K / np.maximum(np.abs(off), HUBER_K))
+        share = HUBER_K / np.maximum(np.abs(off), HUBER_K)
         before, theta = theta, factorise(problem, weight * share).theta
         change = R.U @ ((theta - before) * R.scale)
         if change @ change <= tolerance**2:

@@ -31,6 +31,7 @@ MAX_SLIDE = 0.3  # [m] within which the instrument slides
 MAX_TURN = 1.6  # [rad] within which the hand turns
 DAVINCI_WORDS = ("davinci", "dvrk", "psm")
 OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
+HARMONICS = 12  # more than an excitation usually has: too few distort the motion, too many keep a little noise
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
 OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
 
@@ -85,7 +86,9 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
     text = robot_text(_joint_names(largest), current, _prismatic(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
-    return Arm(name, new_robot, f"written for the {n} joints of the logs, as no listed robot fits", text)
+    return Arm(
+        name, new_robot, f"written for the {n} joints of the logs, as no shipped robot fits; --robot names one", text
+    )
 
 
 def _of_the_kit(arm: Arm, names: Sequence[str], folder: Path) -> Arm:
@@ -135,6 +138,7 @@ def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int] =
             f'name = "{name}"',
             f'kind = "{kind.value}"  # or "{or_kind.value}": CHECK',
             f"terms = [{', '.join(f'{chr(34)}{term}{chr(34)}' for term in TERMS)}]",
+            f"harmonics = {HARMONICS}  # that the excitation has at most",
         ]
         if current:
             lines.append('effort = "A"  # a current; if its constant is known, torque_constant = ... [N m/A]')

@@ -65,13 +65,33 @@ def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
 def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:
     """Yield the contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
 
-    They exceed the `level`, () or (N,).  `rise` [s] is the duration T_s that the smoother gives a step.
+    They exceed the `level`, () or (N,).  `rise` [s] is the duration T_s that the smoother gives a step.  Two peaks of
+    one sign are one contact if the effort between them stays above half of the smaller one.
     """
+    runs: list[tuple[int, int]] = []
     for start, stop in sign_runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
-        size = tau_ext * np.sign(tau_ext[start])
-        onset, onset_std = edge(t, size, std, start, stop, 1, rise)
-        release, release_std = edge(t, size, std, start, stop, -1, rise)
-        yield Event(onset, onset_std, release, release_std)
+        if runs and is_one_contact(tau_ext * np.sign(tau_ext[start]), *runs[-1], start, stop):
+            start = runs.pop()[0]
+        runs.append((start, stop))
+    found = [event_between(t, tau_ext, std, *run, rise) for run in runs]
+    for i in range(len(found) - 1):
+        event, following = found[i], found[i + 1]
+        if event.release > following.onset:
+            middle = 0.5 * (event.release + following.onset)
+            found[i], found[i + 1] = event._replace(release=middle), following._replace(onset=middle)
+    yield from found
+
+
+def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_stop: int) -> bool:
+    """Whether an effort (N,) with the sign of its next peak does not fall below half of the smaller of two peaks."""
+    smaller = min(size[start:stop].max(), size[next_start:next_stop].max())
+    return bool(size[stop:next_start].min(initial=smaller) > 0.5 * smaller > 0.0)
+
+
+def event_between(t: Array, tau_ext: Array, std: Array, start: int, stop: int, rise: float) -> Event:
+    """The contact whose effort (N,) is above the level from sample `start` to `stop`."""
+    size = tau_ext * np.sign(tau_ext[start])
+    return Event(*edge(t, size, std, start, stop, 1, rise), *edge(t, size, std, start, stop, -1, rise))
 
 
 def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:

@@ -23,6 +23,8 @@ SYMBOLS = (
     ("$W$", "weights of weighted least squares", ""),
     ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
     ("$theta_m$", "motor angle", "rad"),
+    ("$beta_j, Y_j$", "parameters of the links, and their columns of the regressor", "as listed"),
+    ("$z_1, z_2, z_3$", "states of presliding friction, from −1 to 1 (in tables, $z$ is a value over its error)", ""),
     ("$N, N_p$", "number of samples; number of periods that are averaged", ""),
     ("$sigma$", "standard deviation of the noise of the signal in the subscript", ""),
     ("$T_s$", "sampling time", "s"),

@@ -103,6 +103,7 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     names = [str(used.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(used, joint)]
     added = [name for name in names if name not in base]
     row = context.efforts_of(used).index(joint)
+    added = [f"“{name}”" if "," in name else name for name in added]
     changed = [f"it adds {' and '.join(', '.join(added).rsplit(', ', 1))}"] if added else []
     changed += ["it couples the joint to the others"] if any(map(is_of_link, used.phi)) else []
     if used.cutoff[row] != plain.cutoff[0]:
@@ -154,10 +155,11 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     table_rows = tuple(parameter_row(context, fit, i, f"$theta_{n}$", f" of {joint}") for n, i in enumerate(rows, 1))
     coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
+    whose = "" if fit.group == joint else " of all joints"
     return Table(
         f"Parameters of the {literal(joint.replace('_', ' '))}. Model: {fit.model}. Estimator: "
-        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. Mean squared error of the effort: {mse}."
-        f"{coupled}",
+        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
+        f"Mean squared error of the effort{whose}: {mse}.{coupled}",
         ("Symbol", "Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$"),
         table_rows,
         label=f"theta-{joint}",

@@ -44,6 +44,7 @@ from davinci_forces.report.verdicts import (
 )
 from davinci_forces.robots.robot import Kind
 
+SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 65.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -120,7 +121,12 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
         f"{logs_in_words(context)}"
     )
     if not windows:
-        return f"{text} No contact is measured, as the study states no contact windows."
+        contact_logs = any(log.role == "contact" for log in context.study.logs)
+        why = "none was found, and the study states none" if contact_logs else "no log has the role contact"
+        return f"{text} No contact is measured: {why}."
+    if not any(contact.stated.any() for contact in contacts):
+        found = f"{count(windows, 'contact')} were found above the alarm level; the study states none."
+        return f"{text} A window counts as a contact for every joint on which it is measured. **{found}**"
     found = f"In {above} of {count(windows, 'contact')}"
     counted = "A window counts as a contact for every joint on which it is measured."
     return f"{text} {counted} **{found}, the effort exceeds the detection level.**"
@@ -253,7 +259,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     yield from looks_at_paths(context, trusts)
     for diagnostic in context.catalogue.records(Diagnostic):
         for text in warning_texts(diagnostic):
-            yield 1.5, literal(text)
+            yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text)
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
@@ -297,7 +303,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
-        narrow = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
+        covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
+        narrow = f"{covers} More logs of free motion, at these speeds and on other days, calibrate it."
         yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
 
 
