@@ -42,12 +42,9 @@ def blocks(context: Context) -> Iterator[Block]:
     if study.changed:
         yield Prose("Changes of the robot:")
         yield Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))
-    number = len(provenance.processed)
-    yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
-    if number:
-        yield OnScreen(
-            "Processed files of each kind of record; kinds without input data", "made", (record_counts(provenance),)
-        )
+    if number := len(provenance.processed):
+        name = f"The {number} processed files by kind of record; kinds without input data"
+        yield OnScreen(name, "made", (record_counts(provenance),))
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
