@@ -1,5 +1,6 @@
 """A small study, analysed once: records of every kind, for the contracts of stages and sections."""
 
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -83,8 +84,10 @@ def sensed() -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory) -> Lab:
-    """The study; it is analysed once a run of the tests, and not to be changed."""
-    folder = once(tmp_path_factory, "contracts", analyse) / "raw" / "arm"
+    """The study, which is analysed once a run of the tests; each process has a copy."""
+    home = tmp_path_factory.mktemp("lab") / "home"
+    shutil.copytree(once(tmp_path_factory, "contracts", analyse), home)
+    folder = home / "raw" / "arm"
     study = study_in(folder)
     its_folders = folders(folder, None, None)
     return Lab(study, its_folders, Plan(study, Ledger(its_folders)))
