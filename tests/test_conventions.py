@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from dataclasses import fields
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -89,7 +90,8 @@ SOLVERS = {
 }  # what modules of maths import beside them, where it is called
 
 
-def imports(source: Path) -> set[str]:
+@cache
+def imports(source: Path) -> frozenset[str]:
     """Modules that a module imports, wherever it does; a name from a package may be a module of it."""
     names = set()
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
@@ -98,7 +100,7 @@ def imports(source: Path) -> set[str]:
             names |= {f"{node.module}.{a.name}" for a in node.names if a.name != "__version__"}
         elif isinstance(node, ast.Import):
             names |= {a.name for a in node.names}
-    return names
+    return frozenset(names)
 
 
 def rooms(source: Path, below: str = "davinci_forces") -> set[str]:
@@ -110,20 +112,20 @@ def tier(room: str, tiers) -> int:
     return next(i for i, row in enumerate(tiers) if room in row)
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda s: str(s.relative_to(ROOT)))
-def test_imports_point_downwards(source):
-    home = source.relative_to(ROOT).parts[0].removesuffix(".py")
-    for room in rooms(source) - {home}:
-        assert tier(room, TIERS) > tier(home, TIERS), f"{home} imports {room}"
+def test_imports_point_downwards():
+    for source in SOURCES:
+        home = source.relative_to(ROOT).parts[0].removesuffix(".py")
+        for room in rooms(source) - {home}:
+            assert tier(room, TIERS) > tier(home, TIERS), f"{home} imports {room}"
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
-def test_imports_of_maths_point_downwards(source):
-    home = source.relative_to(ROOT / "maths").parts[0].removesuffix(".py")
-    if home == "__init__":
-        return
-    for room in rooms(source, "davinci_forces.maths") - {home}:
-        assert tier(room, MATHS) > tier(home, MATHS), f"maths.{home} imports maths.{room}"
+def test_imports_of_maths_point_downwards():
+    for source in sorted((ROOT / "maths").rglob("*.py")):
+        home = source.relative_to(ROOT / "maths").parts[0].removesuffix(".py")
+        if home == "__init__":
+            continue
+        for room in rooms(source, "davinci_forces.maths") - {home}:
+            assert tier(room, MATHS) > tier(home, MATHS), f"maths.{home} imports maths.{room}"
 
 
 @pytest.mark.parametrize("folder", ["report.sections", "estimators", "filters", "commands", "exports"])
@@ -203,40 +205,42 @@ def test_arrays_are_named_once():
     assert [s.name for s in SOURCES if aliases.search(s.read_text(encoding="utf-8"))] == ["arrays.py"]
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
-def test_maths_is_numpy_scipy_and_numba_only(source):
-    outside = {name.split(".")[0] for name in imports(source)}
-    assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "davinci_forces"} | SOLVERS.get(
-        source.name, set()
-    )
-    assert rooms(source) <= {"maths", "errors"}
+def test_maths_is_numpy_scipy_and_numba_only():
+    for source in sorted((ROOT / "maths").rglob("*.py")):
+        outside = {name.split(".")[0] for name in imports(source)}
+        assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "davinci_forces"} | SOLVERS.get(
+            source.name, set()
+        )
+        assert rooms(source) <= {"maths", "errors"}, source
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda s: str(s.relative_to(ROOT)))
-def test_statistics_are_imported_where_they_are_called(source):
-    module = ast.parse(source.read_text(encoding="utf-8"))
-    module.body = [node for node in module.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert "statsmodels" not in ast.unparse(module)
+def test_statistics_are_imported_where_they_are_called():
+    for source in SOURCES:
+        module = ast.parse(source.read_text(encoding="utf-8"))
+        module.body = [node for node in module.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert "statsmodels" not in ast.unparse(module), source
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "stages").rglob("*.py")), ids=lambda s: s.name)
-def test_a_stage_opens_no_file(source):
-    opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "davinci_forces.records.store", "shutil", "io"}
-    assert not imports(source) & opening
-    called = {
-        n.func.id
-        for n in ast.walk(ast.parse(source.read_text()))
-        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-    }
-    assert "open" not in called
+def test_a_stage_opens_no_file():
+    for source in sorted((ROOT / "stages").rglob("*.py")):
+        opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "davinci_forces.records.store", "shutil", "io"}
+        assert not imports(source) & opening, source
+        called = {
+            n.func.id
+            for n in ast.walk(ast.parse(source.read_text()))
+            if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+        }
+        assert "open" not in called, source
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "report").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
-def test_the_report_computes_no_physics(source):
-    physics = {name for name in imports(source) if name.startswith(("davinci_forces.maths", "davinci_forces.robots"))}
-    normal = "davinci_forces.maths.uncertainty.error_band.NORMAL_95"
-    data = ("davinci_forces.maths.arrays.", "davinci_forces.robots.robot.", normal)
-    assert not [name for name in physics if not name.startswith(data)]
+def test_the_report_computes_no_physics():
+    for source in sorted((ROOT / "report").rglob("*.py")):
+        physics = {
+            name for name in imports(source) if name.startswith(("davinci_forces.maths", "davinci_forces.robots"))
+        }
+        normal = "davinci_forces.maths.uncertainty.error_band.NORMAL_95"
+        data = ("davinci_forces.maths.arrays.", "davinci_forces.robots.robot.", normal)
+        assert not [name for name in physics if not name.startswith(data)], source
 
 
 OPENING = {
