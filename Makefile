@@ -21,7 +21,7 @@ INSTALL := $(BIN)/python .ci/install.py
 PINNED := $(INSTALL) --require-hashes -r
 # A file's tests share what they analyse and compile, so a file stays in one process.  Processes share the bytecode of
 # the package, without which each of them takes seconds more to begin.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 UPGRADE ?=
 

@@ -301,6 +301,15 @@ SLOW: dict[str, dict[str, int]] = {
 }
 
 
+# Files that take longest: they come first, so that no process ends long before the others, and no two that make the
+# same study are next to each other.
+FIRST = (
+    "contracts/test_sections.py", "test_runs.py", "simulation/test_closed_loop.py", "test_robustness.py",
+    "test_period.py", "contracts/test_estimators.py", "report/test_campaign.py", "test_faults.py", "test_consistent.py",
+    "guide/test_tutorials.py", "test_real_data.py", "test_parameter_errors.py",
+)  # fmt: skip
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the longest studies, too")
     parser.addoption("--approve", action="store_true", help="keep what there is now as what was approved")
@@ -319,6 +328,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: FIRST.index(_file(item)) if _file(item) in FIRST else len(FIRST))
     cases: Counter[tuple[str, str]] = Counter()
     for item in items:
         file, test = _file(item), item.name.partition("[")[0]

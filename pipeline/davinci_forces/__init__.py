@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from davinci_forces.robots.robot import Robot
 
 __all__ = ["identify", "read", "results", "robot", "run", "stream"]
-__version__ = "0.2.0.dev0"  # pyproject.toml and the citation state it, too
+__version__ = "0.2.0"  # pyproject.toml and the citation state it, too
 
 
 def identify(
