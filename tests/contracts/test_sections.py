@@ -10,6 +10,7 @@ import pytest
 
 from davinci_forces.records import (
     KINDS,
+    Contact,
     Diagnostic,
     Fit,
     FreeSpace,
@@ -40,7 +41,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
-from davinci_forces.report.sections import DOCUMENTS, SECTIONS, ground_truth, joints, runs, tissue
+from davinci_forces.report.sections import DOCUMENTS, SECTIONS, ground_truth, joints, parts, runs, summary, tissue
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study.review import Rating
@@ -281,3 +282,22 @@ def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue
     assert told(context(lab, catalogue)) == every
     assert told(context(lab, without(catalogue, Track))) == every - {"model", "innovation", "correction"}
     assert told(context(lab, without(catalogue, *KINDS.values()))) == set()
+
+
+def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
+    wrong = diagnostic("resample", "push.hand_roll", "warning", "the logged velocity is twice its derivative")
+    said = Catalogue(lambda kind: [*catalogue.records(kind), *([wrong] if kind is Diagnostic else [])])
+    about = context(lab, said)
+    [first, *_] = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
+    assert first == "the logged velocity is twice its derivative"
+
+
+def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):
+    found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
+    about = context(lab, catalogue)
+    said = summary.opening_paragraph(about, [], found)
+    assert f"**{sum(map(len, found))} contacts were found above the alarm level; the study states none.**" in said
+    about = context(lab, without(catalogue, Contact))
+    assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
+        about, [], []
+    )

@@ -233,7 +233,8 @@ def unseen_score(context: Context, joint: str) -> str:
         friction = ", ".join(str(name) for name in used.parameter if "friction" in name)
         model = f"{used.structure}, {len(used.theta)} parameters with {friction}, by {used.estimator}"
     share = percent(trusted.share)
-    return f"{joint.replace('_', ' ')}: {model}; error {error} ({share} of the effort) on {p.log}{level}"
+    where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
+    return f"{joint.replace('_', ' ')}: {model}; error {error} ({share} of the effort) on {where}{level}"
 
 
 def in_current(context: Context) -> str:

@@ -172,7 +172,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         which = "Every log was" if every else f"{clean} of {count(len(summaries), 'log')} were"
         yield Verdict("good" if every and not diagnostics else "info", f"{which} read without a remark.")
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
-    methods = sorted({(s.method, s.velocity) for s in context.catalogue.records(Signal)})
+    methods = sorted({(clock(s, context), s.velocity) for s in context.catalogue.records(Signal)})
     if methods:
         yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
         yield Bullets(
@@ -184,6 +184,11 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
             "messages` explains them:"
         )
         yield Bullets(tuple(remarks_of_stages))
+
+
+def clock(signal: Signal, context: Context) -> str:
+    """The source of the uniform clock; a log without a clock has the rate that the study states."""
+    return "the rate stated in study.toml" if context.study.log(signal.log).rate else signal.method
 
 
 def velocity_source(velocity: str, context: Context) -> str:
