@@ -10,11 +10,13 @@ import pytest
 
 from davinci_forces.records import (
     KINDS,
+    Average,
     Contact,
     Diagnostic,
     Fit,
     FreeSpace,
     LogSummary,
+    PeriodResidual,
     Prediction,
     Stiffness,
     Track,
@@ -41,7 +43,17 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
-from davinci_forces.report.sections import DOCUMENTS, SECTIONS, ground_truth, joints, parts, runs, summary, tissue
+from davinci_forces.report.sections import (
+    DOCUMENTS,
+    SECTIONS,
+    ground_truth,
+    joints,
+    noise,
+    parts,
+    runs,
+    summary,
+    tissue,
+)
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study.review import Rating
@@ -301,3 +313,17 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
         about, [], []
     )
+
+
+@pytest.mark.parametrize(("period", "advice"), [(1, " The arm may not yet have settled: set `skip`."), (3, "")])
+def test_a_period_that_is_noisier_than_the_others_is_named(lab: Lab, catalogue: Catalogue, period: int, advice: str):
+    average = catalogue.select(Average, log="again")[0]
+    [residual] = catalogue.select(PeriodResidual, log=average.log, joint=average.joint)
+    number = ((residual.t - average.t_start) / average.period + 1e-9).astype(int) + 1
+    tau_noise = np.where(number == period, 8.0, 1.0) * np.sign(np.sin(1e4 * residual.t)) * 0.01
+    quiet = np.zeros_like(tau_noise) + 1e-3
+    spoilt = [replace(residual, q_noise=quiet, dq_noise=quiet, tau_noise=tau_noise)]
+    about = replace(context(lab, catalogue), catalogue=Catalogue(lambda kind: spoilt if kind is PeriodResidual else []))
+    [verdict] = noise.outliers(about, average)
+    which = f"effort noise of period {period} of {average.periods} is 8.0 times that of the median period."
+    assert verdict.text.endswith(f"{which}{advice}")
