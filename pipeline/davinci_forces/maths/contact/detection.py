@@ -73,13 +73,13 @@ def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: flo
         if runs and is_one_contact(tau_ext * np.sign(tau_ext[start]), *runs[-1], start, stop):
             start = runs.pop()[0]
         runs.append((start, stop))
-    found = [event_between(t, tau_ext, std, *run, rise) for run in runs]
-    for i in range(len(found) - 1):
-        event, following = found[i], found[i + 1]
+    contacts = [event_between(t, tau_ext, std, *run, rise) for run in runs]
+    for i in range(len(contacts) - 1):
+        event, following = contacts[i], contacts[i + 1]
         if event.release > following.onset:
             middle = 0.5 * (event.release + following.onset)
-            found[i], found[i + 1] = event._replace(release=middle), following._replace(onset=middle)
-    yield from found
+            contacts[i], contacts[i + 1] = event._replace(release=middle), following._replace(onset=middle)
+    yield from contacts
 
 
 def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_stop: int) -> bool:

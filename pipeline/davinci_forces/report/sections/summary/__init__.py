@@ -124,12 +124,11 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
         contact_logs = any(log.role == "contact" for log in context.study.logs)
         why = "none was found, and the study states none" if contact_logs else "no log has the role contact"
         return f"{text} No contact is measured: {why}."
+    text = f"{text} A window counts as a contact for every joint on which it is measured."
+    contacts_in_words = count(windows, "contact")
     if not any(contact.stated.any() for contact in contacts):
-        found = f"{count(windows, 'contact')} were found above the alarm level; the study states none."
-        return f"{text} A window counts as a contact for every joint on which it is measured. **{found}**"
-    found = f"In {above} of {count(windows, 'contact')}"
-    counted = "A window counts as a contact for every joint on which it is measured."
-    return f"{text} {counted} **{found}, the effort exceeds the detection level.**"
+        return f"{text} **{contacts_in_words} were found above the alarm level; the study states none.**"
+    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level.**"
 
 
 def efforts_in_words(context: Context) -> str:
