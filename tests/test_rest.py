@@ -90,7 +90,7 @@ def tracked(signal, identified):
 
 def pushed(stuck, push, identified):
     """The contacts of a resting joint that is pushed, and the threshold."""
-    space, _ = assess.run(tracked(resting(stuck, role="validation"), identified), entry("validation"))
+    space, _ = assess.run(tracked(resting(stuck, role="validation"), identified), entry("validation"), arm.ARM)
     thresholds = list(assess.gather([space]))
     track = tracked(resting(stuck, push), identified)
     made = list(measure.run(track, thresholds, entry("contact"), arm.ARM))
@@ -128,7 +128,7 @@ def test_friction_held_at_rest_moves_no_score_no_level_and_no_band(identified):
         signal = resting(stuck, role="validation")
         made = list(predict.run([arm.motion(signal)], fits, entry("validation"), arm.ARM, lowpass=LOWPASS))
         scores.append([r.relative_error for r in made if isinstance(r, Prediction)])
-        space, _ = assess.run(tracked(signal, identified), entry("validation"))
+        space, _ = assess.run(tracked(signal, identified), entry("validation"), arm.ARM)
         spaces.append([space.free_rms, space.coverage, space.detection_level, space.free_max])
     assert_allclose(*scores, rtol=2e-3)  # the low-pass carries a little of it beyond the samples left out
     assert_allclose(*spaces, rtol=1e-2)

@@ -9,6 +9,9 @@ An onset is modelled as a ramp of duration T that the smoother widens about its 
 
     onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
+A push that rises like a squared sine begins T/4 before such a ramp.  Real pushes lie between the two, so the standard
+error of an onset contains, besides noise, the root mean square of what lies evenly between: T/4/sqrt(3).
+
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
@@ -24,10 +27,12 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.windows import runs
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
+SHAPE = 0.25 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
 TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
 
@@ -60,6 +65,15 @@ def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
     """The effort level that each free motion crosses at most once in ten minutes."""
     alarms = (max(s.crossings / FALSE_ALARMS, 1.0) for s in statistics)
     return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(statistics, alarms, strict=True))
+
+
+def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
+    """The alarm level of an effort (N,) at `rate` [Hz] by the median of its `free` samples (N,).
+
+    It tells nothing of the few samples at which something may have touched the arm.
+    """
+    rms = SIGMA * float(np.median(np.abs(tau_ext[free])))
+    return alarm_level([free_motion_statistics(tau_ext, free, rate)._replace(rms=rms, largest=0.0)])
 
 
 def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:
@@ -110,11 +124,10 @@ def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
     """Onset (inwards 1) or release (-1) of a contact above the level from `start` to `stop`, and its standard error."""
     k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
-    middle = inner_crossing(t, size, k, inwards, 0.5 * peak)
-    upper, lower = inner_crossing(t, size, k, inwards, 0.75 * peak), outer_crossing(t, size, k, inwards, 0.25 * peak)
+    lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
     apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
     duration = float(np.sqrt(max(apparent**2 - rise**2, 0.0)))
-    return middle - 0.5 * inwards * duration, float(std[k]) * apparent / peak
+    return middle - 0.5 * inwards * duration, float(np.hypot(std[k] * apparent / peak, SHAPE * duration))
 
 
 def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
