@@ -405,10 +405,24 @@ def test_two_peaks_are_one_contact_unless_the_effort_falls_between_them(dip, con
 def test_the_stated_error_holds_the_beginning_of_a_push_however_softly_it_begins(power, level):
     """Half a wave of a sine, to a power, from 9 to 11 s."""
     push = np.where(np.abs(T - 10.0) <= 1.0, np.clip(np.cos(np.pi / 2 * (T - 10.0)), 0.0, None) ** power, 0.0)
-    [event] = events(T, 3.0 * push, np.full(len(T), 0.005), level, rise=0.2)
+    [event] = events(T, smoothed(3.0 * push, 0.2), np.full(len(T), 0.005), level, rise=0.2)
     assert abs(event.onset - 9.0) < 2.0 * event.onset_std
     assert abs(event.release - 11.0) < 2.0 * event.release_std
     assert event.onset_std < 0.15
+
+
+def test_a_step_begins_where_it_began():
+    [event] = events(
+        T, smoothed(np.where((T >= 10.0) & (T < 12.5), 2.0, 0.0), 0.2), np.full(len(T), 1e-3), 0.1, rise=0.2
+    )
+    assert (event.onset, event.release) == pytest.approx((10.0, 12.5), abs=0.01)  # a sample
+    assert event.onset_std < 0.01
+
+
+def smoothed(x, rise):
+    """An effort as the smoother shows it: exponential weights on either side, with which a step has a slope 1 / rise."""
+    weights = np.exp(-2.0 * np.abs(np.arange(-200, 201)) / RATE / rise)
+    return np.convolve(x, weights / weights.sum(), "same")
 
 
 def test_a_push_is_found_in_a_stated_window_that_it_fills_or_leaves():

@@ -7,8 +7,9 @@ that level once in ten minutes; the level is at least the largest effort of free
 
 An onset is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
 
-    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
+    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
+A smoothed step has T = 0: it approaches both of its levels exponentially, with its steepest slope 1 / T_s in between.
 A push that rises like a squared sine begins T/4 before such a ramp.  Real pushes lie between the two, so the standard
 error of an onset contains, besides noise, the root mean square of what lies evenly between: T/4/sqrt(3).
 
@@ -33,6 +34,7 @@ from davinci_forces.maths.signals.windows import runs
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
 SHAPE = 0.25 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
+STEP_WIDTH = 2.0 * float(np.log(2.0))  # T_seen of a step, in T_s
 TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
 
@@ -126,7 +128,7 @@ def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int,
     k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
     lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
     apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
-    duration = float(np.sqrt(max(apparent**2 - rise**2, 0.0)))
+    duration = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0)))
     return middle - 0.5 * inwards * duration, float(np.hypot(std[k] * apparent / peak, SHAPE * duration))
 
 
