@@ -420,7 +420,7 @@ def test_a_step_begins_where_it_began():
 
 
 def smoothed(x, rise):
-    """An effort as the smoother shows it: exponential weights on either side, with which a step has a slope 1 / rise."""
+    """An effort with exponential weights on either side, as the smoother shows it: a step has the slope 1 / rise."""
     weights = np.exp(-2.0 * np.abs(np.arange(-200, 201)) / RATE / rise)
     return np.convolve(x, weights / weights.sum(), "same")
 
