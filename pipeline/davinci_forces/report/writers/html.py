@@ -12,7 +12,6 @@ from davinci_forces.report.content import Document, Equation, Figure, Figure3D, 
 from davinci_forces.report.content.inline import Span, parse, printable
 from davinci_forces.report.content.layout import columns, flatten, marked_texts, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
 from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
 from davinci_forces.report.writers.pictures import NAMES, address, looks, shrink
 from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
@@ -25,6 +24,7 @@ LARGEST = 3_400_000  # [bytes] of the whole file; the traces get the space that 
 POINT_BYTES = 11  # per point of a trace: two numbers in single precision, in base 64
 MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # points of one zoomable figure
 STILL_POINTS = 2_000  # points of a figure that does not zoom, for saving its numbers
+FOLDED_POINTS = 600  # points of the picture of a trace on screen only, which the trace replaces
 SIGN = "\0"  # placeholder; no text contains this unprintable character
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 REVIEW_SCRIPTS = ("review.js",)
@@ -56,7 +56,7 @@ def render(document: Document) -> bytes:
         ],
         "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
-    still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
+    still = {name: figure for name, figure in figures.items() if name not in zooms}
     numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
     kept = {name: (numbers_json(one.figure), one.note) for name, one in numbers.items()}
     text = _fill(page, [*kept, *zooms])
@@ -76,9 +76,9 @@ def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
 
 
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
-    """The data URL of a figure's picture; for a trace on screen only, a small picture that the trace replaces."""
-    if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
-        return address(miniature(figure, SMALL if figure.small else LARGER))
+    """The data URL of a figure's picture; that of a trace on screen only has few points."""
+    if on_screen_only and isinstance(figure, Figure) and figure.zoomable:
+        figure = thin_figure(figure, FOLDED_POINTS).figure
     return address(shrink(svg(figure)))
 
 
