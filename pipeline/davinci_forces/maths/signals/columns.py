@@ -87,14 +87,13 @@ def is_current(measured: Sequence[Array], others: Sequence[Sequence[Array]], mov
     `measured` (N,) each; `others`, blocks of as many columns; `moves`, the columns by which blocks are compared.
     """
     alike = [measured, *(block for block in others if all(_alike(measured[i], block[i]) for i in moves))]
-    return any(_is_larger(currents, block) for currents in alike for block in others)
 
+    def is_larger(currents: Sequence[Array], block: Sequence[Array]) -> bool:
+        pairs = [_proportion(x, y) for x, y in zip(currents, block, strict=True)]
+        larger = [cosine > MIN_COSINE and factor > MIN_RATIO_TORQUE for cosine, factor in pairs]
+        return sum(larger) >= min(2, len(pairs))
 
-def _is_larger(currents: Sequence[Array], block: Sequence[Array]) -> bool:
-    """Whether the columns of a block are proportional to these currents and several times as large."""
-    pairs = [_proportion(x, y) for x, y in zip(currents, block, strict=True)]
-    larger = [cosine > MIN_COSINE and factor > MIN_RATIO_TORQUE for cosine, factor in pairs]
-    return sum(larger) >= min(2, len(pairs))
+    return any(is_larger(currents, block) for currents in alike for block in others)
 
 
 def _alike(x: Array, y: Array) -> bool:
@@ -149,19 +148,15 @@ class Outline:
             self.most = max(self.most, float(values[finite].max()))
         self.finite += int(finite.sum())
         end = self.samples + len(values)
-        while end > 2 * self.width * self.bin_size:
-            self._halve()
+        while end > 2 * self.width * self.bin_size:  # join bins in pairs, which doubles their length
+            pairs = (self._sums, self._counts)
+            self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
+            self.bin_size *= 2
         needed = -(-end // self.bin_size)
         number = np.arange(self.samples, end) // self.bin_size
         self._sums = _grown(self._sums, needed) + np.bincount(number, np.where(finite, values, 0.0), minlength=needed)
         self._counts = _grown(self._counts, needed) + np.bincount(number, finite, minlength=needed)
         self.samples = end
-
-    def _halve(self) -> None:
-        """Join bins in pairs, which doubles their length."""
-        pairs = (self._sums, self._counts)
-        self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
-        self.bin_size *= 2
 
     @property
     def mean(self) -> float:

@@ -44,12 +44,9 @@ def find_stuck(t: Array, x: Array) -> list[Stuck]:
 
 def count_saturated(x: Array) -> int:
     """Count the samples of a signal (N,) in runs of several exactly at its largest or its smallest value."""
-    return sum(
-        b - a + 1
-        for level in (x.max(), x.min())
-        for a, b in repeated_runs((x[:-1] == level) & (x[1:] == level))
-        if b - a + 1 >= MIN_SAMPLES_SATURATED and level != 0.0
-    )
+    levels = [level for level in (x.max(), x.min()) if level != 0.0]
+    lengths = [b - a + 1 for level in levels for a, b in repeated_runs((x[:-1] == level) & (x[1:] == level))]
+    return sum(length for length in lengths if length >= MIN_SAMPLES_SATURATED)
 
 
 def beyond_steps(residual: Array, scored: Booleans, slack: Array, width: int) -> Booleans:
