@@ -160,9 +160,6 @@ def draw_bars(bars: Sequence[Bars], frame: Frame) -> str:
         half, tops = BAR_SHARE * width / 2, zip(middle.tolist(), mark.heights.tolist(), strict=True)
         boxes = (frame.box(x - half, x + half, 0.0, y) for x, y in tops)
         svg += path("".join(boxes), fill(COLOURS[mark.colour], 1.0))
-        if mark.std is not None:
-            ends = frame.place_y(mark.heights - mark.std), frame.place_y(mark.heights + mark.std)
-            svg += error_bars(frame.place_x(middle), *ends, WORDS)
     return svg
 
 

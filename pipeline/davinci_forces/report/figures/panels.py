@@ -200,8 +200,7 @@ def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
         case Histogram():
             return [mark.edges], [mark.counts, np.zeros(1)]
         case Bars():
-            std = 0.0 if mark.std is None else mark.std
-            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights - std, mark.heights + std, np.zeros(1)]
+            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights, np.zeros(1)]
         case Line():
             return [mark.x], [mark.y]
         case HLine():
