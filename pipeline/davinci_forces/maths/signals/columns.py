@@ -110,21 +110,18 @@ def _proportion(x: Array, y: Array) -> tuple[float, float]:
 def is_steady(velocity: Array) -> bool:
     """Whether a velocity (N,) stays at one level after another, as in recordings for friction.
 
-    Neighbouring samples are averaged, so that noise does not hide a level.
+    After most moving samples it then hardly changes for a short time.  Neighbouring samples are averaged, so that noise
+    does not hide a level.
     """
-    return steadiness(velocity) >= MIN_STEADY_SHARE
-
-
-def steadiness(velocity: Array) -> float:
-    """Share of the moving samples of a velocity (N,) after which it hardly changes for a short time."""
     N = len(velocity)
     width, lag = max(N // AVERAGED_PARTS, 1), max(N // STEADY_PARTS, 1)
     v = np.convolve(velocity, np.ones(width) / width, "valid")
     if len(v) <= 2 * lag or not v.any():
-        return 0.0
+        return False
     speed = np.abs(v[lag:])
     moves = speed > MIN_SPEED_SHARE * speed.max()
-    return float((np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * speed)[moves].mean()) if moves.any() else 0.0
+    is_level = (np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * speed)[moves]
+    return bool(moves.any() and is_level.mean() >= MIN_STEADY_SHARE)
 
 
 @dataclass

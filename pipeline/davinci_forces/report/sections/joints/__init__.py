@@ -72,9 +72,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
             yield from shown
         else:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
-    for record in context.catalogue.select(Identifiability, group=joint):
-        if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
-            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
+    yield from unidentified_parameters(context, joint)
     yield from implausible([used] if used is not plain else fits, joint)
     yield from left_out(context, joint)
     yield comparison(context, fits)
@@ -219,6 +217,13 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
         *friction_maps(context, group),
     )
     return OnScreen(f"{title(group)}: all fits, and tests of them", f"all-fits-{group}", (table, *more))
+
+
+def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:
+    """Parameters that the identification logs of a joint do not determine."""
+    for record in context.catalogue.select(Identifiability, group=joint):
+        if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
+            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
 
 
 def correlations(context: Context, joint: str) -> Iterator[Block]:
