@@ -94,8 +94,8 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
     t, x = np.arange(samples) / 100, np.random.default_rng(3).normal(size=samples)
     beside = t + np.where(np.arange(samples) % 7 == 3, 1e-6, 0.0)  # s, of 0.01 s: more than a sample on a phase is off
     on, off = (averaging.Phases(times, 4.0, 400).fold(x) for times in (t, beside))
-    assert averaging.on_phases(t, 4.0, 400)
-    assert not averaging.on_phases(beside, 4.0, 400)
+    assert averaging.Phases(t, 4.0, 400).on_them == (samples >= 400)
+    assert not averaging.Phases(beside, 4.0, 400).on_them
     for name in averaging.Folded._fields:
         assert_allclose(getattr(on, name), getattr(off, name), atol=1e-3, err_msg=name)
     assert on.counts.sum() == samples

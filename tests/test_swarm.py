@@ -16,7 +16,7 @@ from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
 from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, bodies, in_table_frames
+from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, in_table_frames
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
@@ -104,7 +104,7 @@ def test_physical_parameters_lump_as_the_chain_does(lc5):
     names = [x.name for x in joint.physical.parameters]
     x = np.array([x.guess for x in joint.physical.parameters])
     x[names.index("lc5")] = lc5
-    chain = reduced_parameters(CHAIN, bodies(lc5), 1, drives=DRIVES)
+    chain = reduced_parameters(CHAIN, in_table_frames(lc5).in_frames(CHAIN.of_links), 1, drives=DRIVES)
     found = dict(zip((term.name for term in joint.terms), known_of(joint).box.lumping.theta(x), strict=True))
     assert found["gravity, sine"] == pytest.approx(chain["gravity, sine"], abs=1e-12)
     assert found["gravity, cosine"] == pytest.approx(chain["gravity, cosine"], abs=1e-12)

@@ -93,8 +93,8 @@ def test_a_sliding_joint_has_no_harmonics_and_one_with_an_offset_gets_no_second(
 
 
 def test_neighbours_of_a_value_lie_on_both_sides():
-    assert neighbours(CUTOFF_GRID, 17.0, 1) == (14.0, 17.0, 20.0)
-    assert neighbours(CUTOFF_GRID, 5.0, 1) == (5.0, 6.0)
+    assert neighbours(CUTOFF_GRID, 17.0) == (14.0, 17.0, 20.0)
+    assert neighbours(CUTOFF_GRID, 5.0) == (5.0, 6.0)
 
 
 def test_a_model_is_rebuilt_from_the_names_and_scales_of_its_parameters():

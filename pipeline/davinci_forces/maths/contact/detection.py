@@ -89,7 +89,11 @@ def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: flo
         if runs and is_one_contact(tau_ext * np.sign(tau_ext[start]), *runs[-1], start, stop):
             start = runs.pop()[0]
         runs.append((start, stop))
-    contacts = [event_between(t, tau_ext, std, *run, rise) for run in runs]
+    contacts = []
+    for start, stop in runs:
+        size = tau_ext * np.sign(tau_ext[start])
+        onset, release = (edge(t, size, std, start, stop, inwards, rise) for inwards in (1, -1))
+        contacts.append(Event(*onset, *release))
     for i in range(len(contacts) - 1):
         event, following = contacts[i], contacts[i + 1]
         if event.release > following.onset:
@@ -104,18 +108,11 @@ def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_sto
     return bool(size[stop:next_start].min(initial=smaller) > 0.5 * smaller > 0.0)
 
 
-def event_between(t: Array, tau_ext: Array, std: Array, start: int, stop: int, rise: float) -> Event:
-    """The contact whose effort (N,) is above the level from sample `start` to `stop`."""
-    size = tau_ext * np.sign(tau_ext[start])
-    return Event(*edge(t, size, std, start, stop, 1, rise), *edge(t, size, std, start, stop, -1, rise))
-
-
 def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
     """Yield start and stop of the runs of one sign (N,); runs of the same sign with a short gap are merged."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]])))
-    signed = [(int(a), int(b)) for a, b in pairwise(edges) if side[a] != 0.0]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]]))).tolist()
     merged: list[tuple[int, int]] = []
-    for a, b in signed:
+    for a, b in ((a, b) for a, b in pairwise(edges) if side[a] != 0.0):
         if merged and t[a] - t[merged[-1][1] - 1] <= MAX_GAP_CONTACT and side[a] == side[merged[-1][0]]:
             merged[-1] = (merged[-1][0], b)
         else:
@@ -194,7 +191,8 @@ def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
 
     If no run of free samples is that long, means are over the longest run; NaN without free samples.
     """
-    return _size([_moving_means(run, length) for run, length in _runs(tau_ext, free, length)])
+    sums = ((np.cumsum(np.concatenate([[0.0], run])), length) for run, length in _runs(tau_ext, free, length))
+    return _size([(total[length:] - total[:-length]) / length for total, length in sums])
 
 
 def largest_size(tau_ext: Array, free: Booleans, length: int) -> float:
@@ -212,8 +210,3 @@ def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]
 
 def _size(parts: list[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")
-
-
-def _moving_means(x: Array, length: int) -> Array:
-    sums = np.cumsum(np.concatenate([[0.0], x]))
-    return np.asarray((sums[length:] - sums[:-length]) / length)
