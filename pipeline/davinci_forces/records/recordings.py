@@ -1,16 +1,17 @@
 """Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names, Published
+from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names
 
 
 @dataclass(frozen=True, eq=False)
 class LogSummary(LogRecord):
     """The summary of reading one log: its clock and rows, and the use of each channel."""
+
+    PUBLISHED = ("log.{log}: rows rate duration jitter longest_gap duplicates dropped",)
 
     role: str
     format: str
@@ -33,11 +34,6 @@ class LogSummary(LogRecord):
     feeds: Labels
     nulls: Counts
     nans: Counts
-
-    def published(self) -> Iterator[Published]:
-        """The properties of the clock and the rows."""
-        names = ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped")
-        yield from self.publish(f"log.{self.log}", *names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +138,11 @@ class Motion(SampledRecord):
 class Average(LogJointRecord):
     """One period of a joint, averaged over the periods of a recording, with the spread between them."""
 
+    PUBLISHED = (
+        "period.{log}: =period± periods",
+        "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±",
+    )
+
     rate: float
     period: float
     period_std: float
@@ -166,13 +167,6 @@ class Average(LogJointRecord):
     tau_var: Column
     tau_alternating: Column
     count: Counts
-
-    def published(self) -> Iterator[Published]:
-        """The period, which the joints of a log share, and the noise between periods."""
-        yield Published(f"period.{self.log}", "period", std="period_std")
-        yield Published(f"period.{self.log}.periods", "periods")
-        names = ("sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
-        yield from self.publish(f"noise.{self.log}.{self.joint}", *names, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
