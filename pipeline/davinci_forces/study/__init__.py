@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.haptics.scenario import HapticScenario
+from davinci_forces.logs.log import Options
 from davinci_forces.robots.robot import Robot
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "AttachedMass",
     "HapticScenario",
     "LogEntry",
+    "Options",
     "Settings",
     "Source",
     "Study",
@@ -100,12 +102,7 @@ class LogEntry:
     free: tuple[tuple[float, float], ...] = ()
     weight: AttachedMass | None = None
     tare: str = ""  # the log of the same path that is subtracted from a weight log
-    delimiter: str | None = None
-    decimal: str | None = None
-    header: bool | None = None
-    encoding: str | None = None
-    dtype: str | None = None  # of raw binary numbers
-    columns: int | tuple[str, ...] | None = None  # of raw binary numbers in a row: their count or names
+    options: Options = field(default_factory=Options)  # how its files are read
 
     @property
     def has_known_free_motion(self) -> bool:
