@@ -71,6 +71,12 @@ class Record:
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
 
     @classmethod
+    def like(cls, source: object, **others: Any) -> Self:
+        """Return a record of other values, and for the rest the attributes of these names of a source."""
+        shared = {f.name: getattr(source, f.name) for f in fields(cls) if hasattr(source, f.name)}  # type: ignore[arg-type]
+        return cls(**{**shared, **others})
+
+    @classmethod
     def lazy(cls, scalars: Mapping[str, Any], column: Callable[[str], NDArray[Any]]) -> Self:
         """Return a record with these scalars that reads a column, by its name, at every access.
 

@@ -22,7 +22,7 @@ def summary(intake: Intake) -> LogSummary:
     BadLog
         If nothing is left to analyse.
     """
-    clock, log, entry, nan = intake.clock, intake.log, intake.entry, float("nan")
+    clock, log, entry = intake.clock, intake.log, intake.entry
     missing = intake.clocks.missing
     missing.require_most(log)
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
@@ -38,7 +38,10 @@ def summary(intake: Intake) -> LogSummary:
             feeds[name].append("time")
     names = [channel.name for channel in log.channels]
     facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
-    return LogSummary(
+    times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
+    rate, duration, jitter, longest_gap = times if intake.has_clock else (float("nan"),) * 4
+    return LogSummary.like(
+        clock,
         log=entry.name,
         role=entry.role,
         format=log.format,
@@ -46,13 +49,10 @@ def summary(intake: Intake) -> LogSummary:
         started=log.started,
         zone=log.zone,
         rows=clock.samples,
-        rate=clock.rate if intake.has_clock else nan,
-        duration=clock.last - clock.first if intake.has_clock else nan,
-        jitter=clock.jitter if intake.has_clock else nan,
-        longest_gap=clock.longest_gap if intake.has_clock else nan,
-        backward=clock.backward,
-        repeated=clock.repeated,
-        duplicates=clock.duplicates,
+        rate=rate,
+        duration=duration,
+        jitter=jitter,
+        longest_gap=longest_gap,
         dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
