@@ -267,7 +267,7 @@ OPENS = {  # a module that opens files otherwise than through `files`, and why i
     "logs/hdf5/datasets.py": "a library in C, after `open_log`",
     "logs/mat/variables.py": "a library in C, after `open_log`",
     "logs/mat/objects.py": "a library in C, given bytes",
-    "logs/npz/members.py": "a member of a file, after `open_log`",
+    "logs/npz.py": "a member of a file, after `open_log`",
     "logs/ros/storage.py": "a library in C, after `isolated` has asked of every file of a bag",
     "logs/tdms/samples.py": "a library, given an opened file",
     "logs/parts.py": "a library, given what is a file",

@@ -1,4 +1,7 @@
-"""Read the arrays of a NumPy file piece by piece, without pickle."""
+"""NumPy's files: an array (.npy), or several by name (.npz); fields of records and columns of matrices are channels.
+
+They are read piece by piece, without pickle.
+"""
 
 import math
 import zipfile
@@ -13,10 +16,18 @@ from numpy.lib import format as npy
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
+from davinci_forces.logs.isolated import reader
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 
+NPY = b"\x93NUMPY"
 MAX_MEMBERS = 1000
+read = reader(__name__)
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether it begins as an array, or is a zip file whose first member is one."""
+    return head.startswith(NPY) or (head.startswith(b"PK") and b".npy" in head[30:542])
 
 
 def open_in_child(path: Path, options: Options) -> Log:

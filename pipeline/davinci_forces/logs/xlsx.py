@@ -1,4 +1,4 @@
-"""Read the sheets of a workbook row by row, with openpyxl."""
+"""Excel's workbooks (.xlsx): the columns of each sheet, below a row of names, read row by row with openpyxl."""
 
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -9,17 +9,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from openpyxl import load_workbook
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.arrays import MAX_COLUMNS
+from davinci_forces.logs.isolated import reader
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_in
 
+FIRST_MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 BLOCK_ROWS_SHEET = 1 << 12
 MAX_HEAD = 50  # rows above the first row of numbers
 MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
 
 Row = tuple[Any, ...]
+read = reader(__name__, "openpyxl", "xlsx")
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether it is a zip file of a workbook."""
+    is_named = path.suffix.lower() in (".xlsx", ".xlsm")
+    return head.startswith(b"PK") and (is_named or head[30:].startswith(FIRST_MEMBERS))
 
 
 def open_in_child(path: Path, options: Options) -> Log:
@@ -34,7 +42,7 @@ def open_in_child(path: Path, options: Options) -> Log:
         size = sum(info.file_size for info in archive.infolist())
     if size > MAX_UNPACKED:
         raise BadLog(f"{path}: unpacked it has {size >> 20} MB, more than {MAX_UNPACKED >> 20}; export it as CSV")
-    with closing(load_workbook(path, read_only=True, data_only=True)) as book:
+    with _book(path) as book:
         sheets = {sheet.title: sheet for sheet in book.worksheets}
         heads = {title: _head(sheet.iter_rows(values_only=True, max_row=MAX_HEAD)) for title, sheet in sheets.items()}
         tables = {title: head for title, head in heads.items() if head}
@@ -58,6 +66,12 @@ def open_in_child(path: Path, options: Options) -> Log:
         log.started, log.zone = log.origin.isoformat(), "local"
         log.time = next(channel.name for channel in log.channels if channel.kind == "time")
     return log
+
+
+def _book(path: Path) -> closing[Any]:
+    from openpyxl import load_workbook
+
+    return closing(load_workbook(path, read_only=True, data_only=True))
 
 
 def _is_number(value: Any) -> bool:
@@ -104,7 +118,7 @@ class SheetLog(Log):
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         waiting: list[list[float]] = []
         empty: list[list[bool]] = []
-        with closing(load_workbook(self.path, read_only=True, data_only=True)) as book:
+        with _book(self.path) as book:
             for number, row in enumerate(book[self.sheet].iter_rows(values_only=True)):
                 if number < self.skipped or all(value is None for value in row):
                     continue
