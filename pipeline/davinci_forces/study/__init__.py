@@ -5,22 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.haptics.scenario import HapticScenario
-from davinci_forces.logs.log import Options
+from davinci_forces.haptics.scenario import HapticScenario as HapticScenario
+from davinci_forces.logs.log import Options as Options
 from davinci_forces.robots.robot import Robot
-
-__all__ = [
-    "WHOLE_LOG",
-    "AttachedMass",
-    "HapticScenario",
-    "LogEntry",
-    "Options",
-    "Settings",
-    "Source",
-    "Study",
-    "Weighing",
-    "Weighings",
-]
 
 WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
