@@ -210,13 +210,7 @@ def options(version: Version = False) -> None:
 
 
 def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
-    """Return the verbosity of a run.
-
-    Raises
-    ------
-    typer.BadParameter
-        If both options are set.
-    """
+    """Return the verbosity of a run; raises typer.BadParameter if both options are set."""
     if quiet and verbose:
         raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")
     return "quiet" if quiet else "verbose" if verbose else "normal"

@@ -38,13 +38,7 @@ def run(
 
 
 def _write_template(file: Path) -> None:
-    """Write the shipped scenario to a new file.
-
-    Raises
-    ------
-    BadRequest
-        If the file exists.
-    """
+    """Write the shipped scenario to a new file; raises BadRequest if the file exists."""
     from importlib.resources import files
 
     from davinci_forces.errors import BadRequest

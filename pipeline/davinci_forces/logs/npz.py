@@ -31,13 +31,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it holds no array of samples, or more than `MAX_MEMBERS`.
-    """
+    """Open the file; raises BadLog if it holds no array of samples, or more than `MAX_MEMBERS`."""
     log = ArrayLog(path, "npz", ())
     with open_file(path) as file:
         is_zip = file.read(2) == b"PK"

@@ -122,13 +122,7 @@ class Record:
         return str(getattr(self, self.ROWS)[row]) if self.ROWS else str(row)
 
     def row_number(self, name: str) -> int:
-        """Return the row with a name.
-
-        Raises
-        ------
-        ValueError
-            If no row has that name.
-        """
+        """Return the row with a name; raises ValueError if no row has that name."""
         return [str(label) for label in getattr(self, self.ROWS)].index(name) if self.ROWS else int(name)
 
     def __post_init__(self) -> None:

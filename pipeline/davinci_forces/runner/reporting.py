@@ -63,13 +63,7 @@ def perform(ledger: Ledger, task: Task) -> Outcome:
 
 
 def render(ledger: Ledger, task: Task) -> dict[str, bytes]:
-    """The content of the report's files, by name.
-
-    Raises
-    ------
-    BadRecord
-        If a record cannot be read.
-    """
+    """The content of the report's files, by name; raises BadRecord if a record cannot be read."""
     from davinci_forces.report.report import write_report  # importing its plotting library takes longer than most runs
 
     study, located = task.given["study"], task.records["records"]

@@ -35,13 +35,7 @@ Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it has no columns, or one name twice.
-    """
+    """Open the file; raises BadLog if it has no columns, or one name twice."""
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a unique name")

@@ -30,13 +30,7 @@ OBJECT = "None"  # scipy's name of a variable that holds an object
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it holds no variable of samples.
-    """
+    """Open the file; raises BadLog if it holds no variable of samples."""
     log = ArrayLog(path, "mat", ())
     with open_file(path) as file:
         head = file.read(128)

@@ -62,13 +62,7 @@ class Topic:
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the bag.
-
-    Raises
-    ------
-    BadLog
-        If none of its topics has numbers.
-    """
+    """Open the bag; raises BadLog if none of its topics has numbers."""
     bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag, cut=bag.cut, warnings=bag.warnings)
     log.topics = _topics(log, bag)

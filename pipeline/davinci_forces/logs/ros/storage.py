@@ -48,13 +48,7 @@ class Database:
         self.cut = False
 
     def open(self) -> None:
-        """List the topics.
-
-        Raises
-        ------
-        BadLog
-            If it is no bag.
-        """
+        """List the topics; raises BadLog if it is no bag."""
         address = f"file:{quote(self.path.as_posix(), safe=LITERAL)}?immutable=1"  # no file appears beside it
         try:
             self.base = self._whole_rows() or sqlite3.connect(address, uri=True)

@@ -50,13 +50,7 @@ class Objects:
     revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # by path: the first values of changed ones
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
-        """Add the metadata of one file segment.
-
-        Raises
-        ------
-        Damaged
-            If it is truncated, or cannot be parsed.
-        """
+        """Add the metadata of one file segment; raises Damaged if it is truncated, or cannot be parsed."""
         take = _Cursor(metadata, order)
         try:
             self._update(take, renew)

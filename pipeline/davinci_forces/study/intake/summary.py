@@ -15,13 +15,7 @@ MOST_JITTER = 0.1  # of the sampling time
 
 
 def summary(intake: Intake) -> LogSummary:
-    """Summarise a log that was read to its end.
-
-    Raises
-    ------
-    BadLog
-        If nothing is left to analyse.
-    """
+    """Summarise a log that was read to its end; raises BadLog if nothing is left to analyse."""
     clock, log, entry = intake.clock, intake.log, intake.entry
     missing = intake.clocks.missing
     missing.require_most(log)
