@@ -108,15 +108,11 @@ class Member:
         file, stored, begin = self.opened
         width = math.prod(self.shape[1:]) * stored.itemsize
         file.seek(begin + first * width)
-        values = np.frombuffer(_exactly(file, (last - first) * width), stored)
+        content = file.read(count := (last - first) * width)
+        if len(content) < count:
+            raise ValueError(f"an array ends after {len(content)} of {count} bytes")
+        values = np.frombuffer(content, stored)
         values = values.reshape(
             (last - first, *self.shape[1:])[: len(self.shape)], order="F" if self.by_column else "C"
         )
         return values[self.of_record] if self.of_record else values
-
-
-def _exactly(file: IO[bytes], count: int) -> bytes:
-    content = file.read(count)
-    if len(content) < count:
-        raise ValueError(f"an array ends after {len(content)} of {count} bytes")
-    return content

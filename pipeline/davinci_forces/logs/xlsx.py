@@ -92,18 +92,14 @@ def _head(rows: Iterator[Row]) -> tuple[list[str], list[str], int, Row] | None:
         filled = [one for one in texts if sum(map(bool, one)) > 1] or [one for one in texts if any(one)]
         if not filled or len(row) > MAX_COLUMNS:
             return None
-        is_units = len(filled) > 1 and all(len(cell) <= 8 for cell in filled[-1]) and _widths(filled[-2], filled[-1])
+        short = len(filled) > 1 and all(len(cell) <= 8 for cell in filled[-1])
+        is_units = short and all(name for name, unit in zip(*filled[-2:], strict=False) if unit)
         names, units = (filled[-2], filled[-1]) if is_units else (filled[-1], [""] * len(row))
         last = max(i for i, value in enumerate(row) if value is not None) + 1
         width = max(last, *(i + 1 for i, name in enumerate(names) if name))
         padded = [[*cells, *[""] * width][:width] for cells in (names, units)]
         return padded[0], [unit.strip("[]()") for unit in padded[1]], number, (*row, *[None] * width)[:width]
     return None
-
-
-def _widths(names: Sequence[str], units: Sequence[str]) -> bool:
-    """Whether a row of names has a name above each of the units."""
-    return all(name for name, unit in zip(names, units, strict=False) if unit)
 
 
 @dataclass

@@ -193,12 +193,6 @@ def seal(entry: Entry) -> str:
     return text.removesuffix("\n}") + SEAL.format(hash_of_text(text))
 
 
-def unseal(text: str) -> Entry | None:
-    """The entry of a text, or None if its hash is wrong."""
-    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
-    return Entry(**json.loads(content)) if text.endswith(SEAL.format(hash_of_text(content))) else None
-
-
 def check(entry: Entry, stage: str, name: str) -> Entry:
     """Check that a run would write this entry under this stage and name, and return it.
 
@@ -228,10 +222,15 @@ def check(entry: Entry, stage: str, name: str) -> Entry:
 
 def _read(file: str) -> Entry:
     """Read the entry in a file; raises as `check` does, and if the file cannot be read or its hash is wrong."""
-    entry = unseal(read_bytes(file).decode())
-    if entry is None:
+    text = read_bytes(file).decode()
+    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
+    if not text.endswith(SEAL.format(hash_of_text(content))):
         raise ValueError("it is not as a stage wrote it")
-    return check(entry, os.path.basename(os.path.dirname(file)), os.path.basename(file).removesuffix(".json"))
+    return check(
+        Entry(**json.loads(content)),
+        os.path.basename(os.path.dirname(file)),
+        os.path.basename(file).removesuffix(".json"),
+    )
 
 
 def _digest(file: str) -> str:

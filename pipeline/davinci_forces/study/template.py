@@ -190,15 +190,10 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf") and any("i" in draft.guess.symbols() for draft in drawn):
-        yield from _in_amperes(robot)
-
-
-def _in_amperes(robot: Robot) -> Iterator[str]:
-    """Lines that make currents the effort of joints, as a URDF has no torque constants."""
-    for joint in robot.joints:
-        yield ""
-        yield f"[robot_overrides.{joint.name}]"
-        yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
+        for joint in robot.joints:  # a URDF has no torque constants
+            yield ""
+            yield f"[robot_overrides.{joint.name}]"
+            yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
@@ -176,19 +175,17 @@ class Reading:
             before = np.concatenate(([self.last_x], x[:-1]))
             begins = x <= before
             begins[run.begins] = False
-            self._went_back(run, np.flatnonzero(begins), before, x)
+            back = np.flatnonzero(begins)
+            if len(back) and not self.back:
+                i = int(back[0])
+                word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
+                self.went_back = f"line {run.line(i)}: x {word} {x[i]:g} in row {self.rows + i + 1}"
+            self.back += len(back)
             self.last_x = x[-1]
         begins[run.begins] = True
         writes = self.write + np.cumsum(begins)
         self.write = int(writes[-1]) if rows else self.write
         return writes.astype(np.float64)
-
-    def _went_back(self, run: Run, rows: NDArray[np.intp], before: Array, x: Array) -> None:
-        if len(rows) and not self.back:
-            i = rows[0]
-            word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
-            self.went_back = f"line {run.line(int(i))}: x {word} {x[i]:g} in row {self.rows + int(i) + 1}"
-        self.back += len(rows)
 
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
         """Compute the time [s] since the start of the first file segment, from the headers of a channel.

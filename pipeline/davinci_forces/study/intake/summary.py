@@ -27,7 +27,7 @@ def summary(intake: Intake) -> LogSummary:
     feeds: dict[str, list[str]] = {}
     for quantity, channel in intake.channels.items():
         feeds.setdefault(channel.name, []).append(quantity)
-    for name in intake.clocks.times_used:
+    for name in filter(None, (group.time for group in intake.clocks.groups)):
         if "time" not in feeds.setdefault(name, []):
             feeds[name].append("time")
     names = [channel.name for channel in log.channels]
