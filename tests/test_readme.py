@@ -136,7 +136,7 @@ def test_channels_are_those_that_there_are_with_the_units_taken():
 def test_formats_and_what_they_need_are_those_that_there_are():
     assert named(rows("format", "files")) == list(FORMATS)
     code = "".join(source.read_text(encoding="utf-8") for source in (PACKAGE / "logs").rglob("*.py"))
-    required = dict(re.findall(r'reader\((?:"[\w.]+"|__name__), "(\w+)", "(\w+)"\)', code))
+    required = dict(re.findall(r'package="(\w+)", extra="(\w+)"', code))
     table = rows("package", "licence")
     assert {spans(row[0])[0]: re.search(r"\[(\w+)\]", row[3])[1] for row in table} == required
     optional = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]

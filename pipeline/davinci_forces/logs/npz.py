@@ -7,6 +7,7 @@ import math
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,14 +16,14 @@ from numpy.lib import format as npy
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
+from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
-from davinci_forces.logs.isolated import reader
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 
 NPY = b"\x93NUMPY"
 MAX_MEMBERS = 1000
-read = reader(__name__)
+read = partial(isolated.read, reader=__name__)
 
 
 def recognises(path: Path, head: bytes) -> bool:

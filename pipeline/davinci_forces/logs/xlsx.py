@@ -5,14 +5,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from davinci_forces.errors import BadLog
+from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import MAX_COLUMNS
-from davinci_forces.logs.isolated import reader
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_in
 
 FIRST_MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
@@ -21,7 +22,7 @@ MAX_HEAD = 50  # rows above the first row of numbers
 MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
 
 Row = tuple[Any, ...]
-read = reader(__name__, "openpyxl", "xlsx")
+read = partial(isolated.read, reader=__name__, package="openpyxl", extra="xlsx")
 
 
 def recognises(path: Path, head: bytes) -> bool:

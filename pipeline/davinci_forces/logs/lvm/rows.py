@@ -88,20 +88,18 @@ class Reading:
                 "is not a number; correct the cell, or take the row out of the log"
             ) from None
 
-    def _wanted(self, run: Run) -> dict[int, str]:
-        return self._columns_of(run, self.names)
-
     def _columns_of(self, run: Run, channels: Sequence[str]) -> dict[int, str]:
         names = ((i, run.name(i)) for i in range(run.width - run.commented))
         return {i: name for i, name in names if name in channels}
 
     def _columns(self, run: Run) -> list[int]:
-        return sorted({0, *self._wanted(run), *self._columns_of(run, self.together)})
+        return sorted({0, *self._columns_of(run, self.names), *self._columns_of(run, self.together)})
 
     def _block(self, run: Run, cells: Cells) -> Block:
         """Return the samples of a run by the names of their channels."""
-        block: Block = {name: cells.columns[i] for i, name in self._wanted(run).items()}
-        empty = {name: cells.empty[i] for i, name in self._wanted(run).items() if i in cells.empty}
+        wanted = self._columns_of(run, self.names)
+        block: Block = {name: cells.columns[i] for i, name in wanted.items()}
+        empty = {name: cells.empty[i] for i, name in wanted.items() if i in cells.empty}
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
