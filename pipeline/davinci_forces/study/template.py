@@ -26,9 +26,7 @@ from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
-MAX_ANGLE_DRIVE = (
-    6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
-)
+MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way, as drives with limits turn; larger may be degrees
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
 

@@ -13,7 +13,7 @@ from davinci_forces.logs.log import Block, Log
 from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
-from davinci_forces.logs.timeline import OwnClock, Sampling
+from davinci_forces.logs.timeline import OwnClock
 from davinci_forces.maths.arrays import Array, Booleans
 
 MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
@@ -193,19 +193,15 @@ class Reading:
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
         samplings = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
-        starts = [self._seconds_from_first(sampling) for sampling in samplings]
+        zero = self.first.start if self.first else None
+        dates = (sampling.start for sampling in samplings)
+        starts = [np.nan if start is None or zero is None else float(start - zero) for start in dates]
         if x is None:
             x0, step = [sampling.x0 for sampling in samplings], [sampling.step for sampling in samplings]
             number = np.arange(rows) - np.repeat(firsts, counts)
             number[: counts[0]] += before
             x = np.repeat(x0, counts) + np.repeat(step, counts) * number
         return np.where(np.abs(x) > MIN_ABSOLUTE_X, x, x + np.repeat(starts, counts))
-
-    def _seconds_from_first(self, sampling: Sampling) -> float:
-        """Time from the start of the log to that of a file segment [s]; NaN if one has no date."""
-        assert self.first is not None
-        start, zero = sampling.start, self.first.start
-        return float(start - zero) if start is not None and zero is not None else np.nan
 
     def _check_samples(self) -> None:
         """Check the header's count of samples: of its write, or with a single header of the first write only."""
