@@ -1,8 +1,6 @@
 """Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names
 
@@ -56,24 +54,8 @@ class Touch(LogRecord):
     z: Column
 
 
-def none_filled() -> Counts:
-    """Return the default flags of a `SampledRecord`: no sample is filled in."""
-    return np.zeros(0, np.int64)
-
-
-class SampledRecord(LogJointRecord):
-    """A record of samples, some of which may be `filled` in where they were missing."""
-
-    filled: Counts
-
-    def __post_init__(self) -> None:
-        if not np.any(self.filled):
-            object.__setattr__(self, "filled", np.zeros(len(self.t), np.int64))  # type: ignore[attr-defined]
-        super().__post_init__()
-
-
 @dataclass(frozen=True, eq=False)
-class Recording(SampledRecord):
+class Recording(LogJointRecord):
     """One joint during one log, as recorded: on the log's clock, in joint units."""
 
     role: str
@@ -83,11 +65,11 @@ class Recording(SampledRecord):
     q: Column
     dq: Column
     tau: Column
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(SampledRecord):
+class Signal(LogJointRecord):
     """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
 
     role: str
@@ -101,11 +83,11 @@ class Signal(SampledRecord):
     dq: Column
     tau: Column
     segment: Counts
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(SampledRecord):
+class Motion(LogJointRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
     The noise is what the filter removes.  The velocity `dq` is 0 where its sign is not known.  Where the joint stands
@@ -131,7 +113,7 @@ class Motion(SampledRecord):
     tau: Column
     segment: Counts
     standing: Counts
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
