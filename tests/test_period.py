@@ -32,7 +32,8 @@ def moved(u, still=None, name="hand_roll", T=10.0, seed=0, noise=1.0) -> Signal:
     )
     q, dq = q + 1e-4 * rng.normal(size=len(u)), dq + 1e-3 * rng.normal(size=len(u))
     t = np.arange(len(u)) / RATE
-    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": np.zeros(len(u), int)}
+    zero = np.zeros(len(u), int)
+    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": zero, "filled": zero}
     return Signal("run", name, "identification", RATE, "as recorded", "logged", 0, 0, **columns)
 
 

@@ -51,7 +51,8 @@ def resting(stuck, push=0.0, role="contact", seed=3) -> Signal:
     parts = {name: np.concatenate([getattr(moving, name)[before], x, getattr(moving, name)[~before]])
              for name, x in columns.items()}  # fmt: skip
     times = np.arange(len(parts["q"])) / RATE
-    return replace(moving, t=times, segment=np.zeros(len(times), int), **parts)
+    zero = np.zeros(len(times), int)
+    return replace(moving, t=times, segment=zero, filled=zero, **parts)
 
 
 def entry(role) -> LogEntry:
@@ -189,7 +190,9 @@ def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(id
     reversals = signal.t[1:][np.diff(np.sign(arm.excitation("hand_roll", signal.t)[1])) != 0]
     gap = np.argmax(np.diff(reversals))
     once = (signal.t > reversals[gap] - 0.3) & (signal.t < reversals[gap + 1] - 0.3)
-    single = replace(harder, **{name: getattr(harder, name)[once] for name in ("t", "q", "dq", "tau", "segment")})
+    single = replace(
+        harder, **{name: getattr(harder, name)[once] for name in ("t", "q", "dq", "tau", "segment", "filled")}
+    )
     touched = replace(signal, tau=signal.tau + np.where((signal.t > 2.0) & (signal.t < 3.0), 1.0, 0.0))
     for log in (harder, single):
         assert not judged(log, identified[0])[1]

@@ -40,7 +40,8 @@ def motion(added=(), noise=0.0, lag=0.0, seed=0) -> Motion:
     tau = effort(t - lag) + 0.02 * random.normal(size=len(t))
     zero = np.zeros(len(t), np.int64)
     about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
-    return Motion("run", ROLL.name, *about, t, *smooth, np.gradient(smooth[1], 1 / RATE), *measured, tau, zero, zero)
+    ddq = np.gradient(smooth[1], 1 / RATE)
+    return Motion("run", ROLL.name, *about, t, *smooth, ddq, *measured, tau, zero, zero, zero)
 
 
 def search(record: Motion, joint=ROLL):

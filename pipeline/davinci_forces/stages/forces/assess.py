@@ -88,7 +88,8 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     for joint, joint_spaces in by_joint.items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
-        level, source = max(((alarm_level_of(space), space) for space in unfitted), key=lambda pair: pair[0])
+        statistics = ([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)] for space in unfitted)
+        level, source = max(zip(map(alarm_level, statistics), unfitted, strict=True), key=lambda pair: pair[0])
         yield Threshold(
             joint, SMOOTHER, worst.detection_level, worst.detection_level_std, level,
             level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log, len(unfitted),
@@ -102,8 +103,3 @@ def pooled_coverage(spaces: list[FreeSpace]) -> tuple[float, float]:
     by_blocks = float(np.sqrt(np.sum(errors**2))) / len(shares)
     by_logs = float(np.std(shares, ddof=1)) / len(shares) ** 0.5 if len(shares) >= MIN_LOGS_BAND else 0.0
     return float(shares.mean()), max(by_blocks, by_logs)
-
-
-def alarm_level_of(space: FreeSpace) -> float:
-    """Alarm level: the effort that free motion exceeds at most once in ten minutes; it grows with its rms."""
-    return alarm_level([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)])

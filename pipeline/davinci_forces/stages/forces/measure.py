@@ -102,16 +102,7 @@ def contacts(
         "peak_std", "mean", "mean_std", "impulse", "impulse_std",
     )  # fmt: skip
     columns = dict(zip(names, np.array(rows).T, strict=True))
-    yield Contact(
-        log=track.log,
-        joint=track.joint,
-        filter=threshold.filter,
-        detection_level=threshold.detection_level,
-        alarm_level=threshold.alarm_level,
-        level_from=threshold.level_from,
-        above=np.array(above, np.int64),
-        **columns,
-    )
+    yield Contact.like(threshold, log=track.log, above=np.array(above, np.int64), **columns)
 
 
 def unknown_friction(track: Track) -> Array:
