@@ -13,7 +13,7 @@ from davinci_forces.robots.davinci_chain import CHAIN
 from tests import arm
 
 RATE = 100.0
-SETTINGS = '[settings]\nfit = "independent.huber"\nlowpass = 11.0\ndelay = 0.15\n[settings.effort]\nhand_roll = 0.3\n'
+SETTINGS = "[settings]\nlowpass = 11.0\ndelay = 0.15\n[settings.effort]\nhand_roll = 0.3\n"
 WEIGHT = 'weight = { mass = 0.5, moves_with = "instrument_slide", position = [0.02, 0.01, -0.3] }'
 STIFFNESS = 300.0  # [N/m]
 MASS, PLACE = 0.6, (0.02, 0.01, -0.3)  # the mass hung on it is heavier than stated
@@ -59,7 +59,7 @@ def _at(signal: Signal, when: np.ndarray) -> Signal:
 def _held(signal: Signal, start: float, seconds: float, seed: int) -> Signal:
     """The signal with a stop from a time on, in which only noise is left of its motion."""
     at, samples = round(start * signal.rate), round(seconds * signal.rate)
-    held = _at(signal, np.r_[0:at, np.full(samples, at), at : len(signal)])
+    held = _at(signal, np.r_[0:at, np.full(samples, min(at, len(signal) - 1)), at : len(signal)])
     stop = slice(at, at + samples)
     rng = np.random.default_rng(seed)
     q, dq = held.q.copy(), held.dq.copy()
@@ -69,9 +69,10 @@ def _held(signal: Signal, start: float, seconds: float, seed: int) -> Signal:
 
 
 def _stopped(name: str) -> Log:
-    """A stop before the motion, and a period that is stated wrongly."""
-    roll = _held(arm.signal("hand_roll", 1, 6, RATE, 2.0), 0.0, 1.5, 2)
-    return name, [roll], {}, arm.log_table(name, f"{name}.csv", "identification", ["hand_roll"], "period = 2.02")
+    """A stop before the motion, another after a gap of the clock, and a period that is stated wrongly."""
+    roll = _held(_held(arm.signal("hand_roll", 1, 6, RATE, 2.0), 0.0, 1.5, 2), 13.5, 1.0, 2)
+    paused = replace(roll, t=roll.t + np.where(roll.t >= 13.5, 0.8, 0.0))
+    return name, [paused], {}, arm.log_table(name, f"{name}.csv", "identification", ["hand_roll"], "period = 2.02")
 
 
 def _uneven(name: str) -> Log:
@@ -84,8 +85,10 @@ def _uneven(name: str) -> Log:
 
 
 def _resting(name: str) -> Log:
-    """A joint that moves beside one that rests."""
+    """A joint that moves, with a harmonic more than the analysis keeps, beside one that rests."""
     slide, pitch = arm.signal("instrument_slide", 4, 5, RATE, 2.0), arm.signal("hand_pitch", 4, 5, RATE, 2.0)
+    w = 3 * 2 * np.pi  # the joint repeats every second
+    slide = replace(slide, q=slide.q + 5e-4 * np.sin(w * slide.t), dq=slide.dq + 5e-4 * w * np.cos(w * slide.t))
     still = replace(pitch, q=np.full(len(pitch), 0.1), dq=np.zeros(len(pitch)))
     joints = ["instrument_slide", "hand_pitch"]
     return name, [slide, still], {}, arm.log_table(name, f"{name}.csv", "identification", joints)
@@ -101,14 +104,16 @@ def _without_period(name: str) -> Log:
 
 
 def _broken(name: str) -> Log:
-    """A stop, a gap, a slow stretch, a saturated drive and a velocity in a wrong unit."""
+    """A stop, a gap, a slow stretch, a saturated drive, a velocity in a wrong unit and a controller that goes off."""
     roll = _held(arm.signal("hand_roll", 9, 5, RATE, 2.6), 5.0, 2.0, 9)
     kept = np.ones(len(roll), bool)
     kept[850:920] = False
-    kept[1000:1200:2] = False
+    kept[1000:1200] = np.arange(200) % 5 == 0
     columns = {n: getattr(roll, n)[kept] for n in ("t", "q", "dq", "tau", "segment", "filled")}
-    limit = np.percentile(np.abs(columns["tau"]), 97)
-    columns |= {"tau": np.clip(columns["tau"], -limit, limit), "dq": 1.3 * columns["dq"]}
+    slow = np.convolve(columns["tau"], np.ones(9) / 9, "same")  # a drive that is saturated is so for a while
+    limit = np.percentile(np.abs(slow), 97)
+    tau = np.where(np.abs(slow) > limit, np.sign(slow) * 2 * limit, columns["tau"]) * (columns["t"] < roll.t[-40])
+    columns |= {"tau": tau, "dq": 1.3 * columns["dq"]}
     return name, [replace(roll, **columns)], {}, arm.log_table(name, f"{name}.csv", "validation", ["hand_roll"])
 
 
@@ -124,7 +129,12 @@ def _sensed(name: str) -> Log:
     push = lambda t: triangle(t, 3.0, 6.0, 9.0)
     slide = arm.signal("instrument_slide", 11, 5, RATE, 2.6, external=push)
     table = arm.log_table(name, f"{name}.csv", "contact", ["instrument_slide"], "contact = [[3.0, 6.0]]")
-    return name, [slide], {"force": push(slide.t - 0.04)}, f'{table}force = "force"\n'
+    return (
+        name,
+        [slide],
+        {"force": push(slide.t - 0.04) + 0.05 * np.random.default_rng(11).normal(size=len(slide))},
+        f'{table}force = "force"\n',
+    )
 
 
 def _hung(name: str) -> Log:

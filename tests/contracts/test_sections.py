@@ -61,7 +61,9 @@ from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
-PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
+HASHES = {"0" * 64: "raw/arm/roll.csv", "1" * 64: f"{Fit.folder()}/independent/hand_roll.parquet"}
+RAW, PROCESSED = ({place: sha} for sha, place in HASHES.items())
+PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, RAW, PROCESSED, {"fit": "no joint moves"})
 
 
 RATINGS = (
@@ -72,7 +74,8 @@ RATINGS = (
 
 def context(lab: Lab, catalogue: Catalogue) -> Context:
     results = collect(catalogue)
-    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, baseline=baseline(results))
+    labels = frozenset({"answer-figure"})
+    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, labels, baseline(results))
 
 
 def baseline(results: Results) -> dict[str, StatedValue]:
