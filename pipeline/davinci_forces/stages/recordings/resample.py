@@ -194,7 +194,7 @@ def remarks(signal: Signal, recording: Recording, T_s: float, cuts: list[int], s
     name, notes, t = f"{recording.log}/{recording.joint}", [], recording.t
     if cuts:
         where = ", ".join(f"{t[c - 1]:.3f} s" for c in cuts[:5])
-        notes.append(f"{name}: {len(cuts)} gaps, not longest_bridge, after {where}{' ...' if len(cuts) > 5 else ''}")
+        notes.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
     if samples < len(recording):
         short = f"segments of fewer than {MIN_SAMPLES_SEGMENT}"
         notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")
