@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import pytest
 
+from davinci_forces.maths.compiled import SOURCES
 from davinci_forces.runner.fingerprints.code import code
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -176,9 +177,8 @@ class Tree:
 @cache
 def behind_compiled_code() -> frozenset[str]:
     """The modules that compile functions, and all that they import: what compiled code depends on."""
-    files = [
-        file for file in (ROOT / PACKAGE).rglob("*.py") if imports(file.read_text(), "davinci_forces.maths.compiled")
-    ]
+    files = [file for folder in SOURCES for file in (ROOT / PACKAGE / folder).rglob("*.py")]
+    files = [file for file in files if imports(file.read_text(), "davinci_forces.maths.compiled")]
     return frozenset(code(*(dotted_name(file) for file in files)))
 
 

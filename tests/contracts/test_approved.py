@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from davinci_forces.records import KINDS, Diagnostic, Record
+from davinci_forces.records import KINDS, Diagnostic, Fit, Record
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.content import Number
 from davinci_forces.report.context import Context
@@ -101,14 +101,17 @@ def without_errors(study: Small) -> Context:
 
 
 def of_one_joint(study: Small) -> Context:
-    """The study as if it was one joint, which moves in its first log and in its first test."""
+    """The study as if it was one joint with one fit by itself, which moves in its first log and in its first test."""
     [joint, *_], logs = study.lab.study.robot.joints, study.lab.study.logs
     names = {next(log.name for log in logs if log.role == role) for role in ("identification", "validation")}
 
     def is_of_it(record: Record) -> bool:
+        if isinstance(record, Fit) and (record.model, record.estimator) not in (("independent", "lse"), *chosen):
+            return False
         log, name = (getattr(record, field, default) for field, default in (("log", ""), ("joint", joint.name)))
         return log in {"", *names} and name == getattr(record, "group", joint.name) == joint.name
 
+    chosen = [(fit.model, fit.estimator) for fit in study.catalogue.records(Fit) if fit.model != "independent"]
     catalogue = Catalogue(lambda kind: [record for record in study.catalogue.records(kind) if is_of_it(record)])
     return context(study.lab, catalogue)
 

@@ -382,3 +382,16 @@ def test_a_joint_tested_on_its_own_path_comes_between_errors_of_a_third_and_of_a
         looks = sorted(summary.looks_at(full, [other, same]), key=lambda look: -look[0])
         texts = [text for _, text in looks if "model error is" in text or "tested only" in text]
         assert first in texts[0]
+
+
+@pytest.mark.parametrize(("seconds", "hidden"), [(1.0, 0.1), (20.0, 0.25)])
+def test_what_a_filter_says_before_it_has_converged_is_not_what_an_effort_reaches(full: Context, seconds, hidden):
+    """A quarter of a second, of a short log a tenth."""
+    track, rate = full.catalogue.records(Track)[0], 100.0
+    t = np.arange(round(seconds * rate)) / rate
+    columns = dict.fromkeys(Track.columns(), np.ones(len(t))) | {"t": t}
+    for at, reached in ((round(hidden * rate) - 1, False), (round(hidden * rate), True)):
+        effort = np.ones(len(t))
+        effort[at] = 50.0
+        figure = runs.trace(full, replace(track, rate=rate, **columns | {"tau_ext_smooth": effort}), "")
+        assert ("reaches 50" in figure.alt) == reached
