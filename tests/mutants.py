@@ -94,18 +94,18 @@ def draw(seed: int, count: int) -> list[Mutant]:
 
 
 def tests_for(mutant: Mutant) -> list[str]:
-    """Return the test files for a mutant, those that import its module first."""
+    """Return the test files for a mutant: those that import its module, the small studies, those of its importers."""
     dotted = dotted_name(ROOT / mutant.file)
     sources = {p: p.read_text() for p in (ROOT / PACKAGE).rglob("*.py")}
     importers = [p for p, text in sources.items() if imports(text, dotted)]
     near = [dotted_name(p) for p in importers]
     near.append(dotted.rpartition(".")[0])  # choices of a room are imported by name
     files = {p: p.read_text() for p in sorted((ROOT / "tests").rglob("test_*.py")) if "benchmarks" not in p.parts}
-    rank = {p: 0 if imports(t, dotted) else 1 if any(imports(t, n) for n in near) else 3 for p, t in files.items()}
-    rank[ROOT / SMALL_STUDY] = 0
+    rank = {p: 0 if imports(t, dotted) else 2 if any(imports(t, n) for n in near) else 4 for p, t in files.items()}
+    rank[ROOT / SMALL_STUDY] = 1
     for name in ("contracts/test_stages.py", "contracts/test_sections.py", "contracts/test_results.py"):
-        rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 2)
-    chosen = sorted((p for p in rank if rank[p] < 3), key=lambda p: (rank[p], p))[:MAX_FILES]
+        rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 3)
+    chosen = sorted((p for p in rank if rank[p] < 4), key=lambda p: (rank[p], p))[:MAX_FILES]
     return [p.relative_to(ROOT).as_posix() for p in chosen]
 
 
@@ -113,7 +113,7 @@ def imports(text: str, dotted: str) -> bool:
     """Whether a source imports a module, by its whole name or from its package."""
     package, _, name = dotted.rpartition(".")
     return bool(re.search(rf"(?m)^\s*(from|import) {re.escape(dotted)}\b", text)) or bool(
-        re.search(rf"(?ms)^\s*from {re.escape(package)} import [^\n]*\b{re.escape(name)}\b", text)
+        re.search(rf"(?m)^\s*from {re.escape(package)} import (\([^)]*|[^\n]*)\b{re.escape(name)}\b", text)
     )
 
 

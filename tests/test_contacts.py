@@ -397,3 +397,12 @@ def test_two_peaks_are_one_contact_unless_the_effort_falls_between_them(dip, con
     found = list(events(T, x, np.full(len(T), 0.01), 0.9, rise=0.0))
     assert len(found) == contacts
     assert all(a.release <= b.onset + 1e-9 for a, b in pairwise(found))
+
+
+def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():
+    found = day_offset(np.arange(4.0), np.array([0.2, 0.2, 0.4, 0.4]), [(-0.5, 3.5)])
+    assert found.value == pytest.approx(0.3)
+    assert found.drift == pytest.approx(0.2)
+    one_each = day_offset(np.arange(2.0), np.array([0.2, 0.5]), [(-0.5, 1.5)])
+    assert one_each.drift_std == pytest.approx(np.hypot(0.2, 0.5))
+    assert not one_each.drifts
