@@ -461,3 +461,12 @@ def test_a_touch_in_a_log_of_free_motion_is_named_and_free_motion_is_not():
         assert "give the log the role contact, or state its contact windows" in warning.text[0]
     stated = entry(role="validation", contact=((19.5, 22.5),))
     assert len(list(assess.run(track(slow_noise(0.05) + push, role="validation"), stated, arm.ARM))) == 2
+
+
+def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():
+    found = day_offset(np.arange(4.0), np.array([0.2, 0.2, 0.4, 0.4]), [(-0.5, 3.5)])
+    assert found.value == pytest.approx(0.3)
+    assert found.drift == pytest.approx(0.2)
+    one_each = day_offset(np.arange(2.0), np.array([0.2, 0.5]), [(-0.5, 1.5)])
+    assert one_each.drift_std == pytest.approx(np.hypot(0.2, 0.5))
+    assert not one_each.drifts

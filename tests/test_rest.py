@@ -27,6 +27,7 @@ from davinci_forces.stages.model import fit, predict
 from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import LogEntry
 from tests import arm
+from tests.report.report_records import free_space
 
 RATE, LOWPASS = 100.0, 17.0
 JOINT = arm.joint("hand_roll")
@@ -198,3 +199,11 @@ def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(id
         assert not judged(log, identified[0])[1]
     assert not judged(replace(touched, role="contact"), identified[0], contact=((1.9, 3.1),))[1]
     assert judged(touched, identified[0])[1]  # nobody stated it: named
+
+
+def test_without_an_error_in_free_motion_there_is_no_alarm_level_and_no_error_of_one():
+    space = free_space(joint="hand_roll", tested=1000, quartile_coverage=np.ones(4), quartile_coverage_std=np.zeros(4))
+    [threshold] = assess.gather([space])
+    assert (threshold.alarm_level, threshold.alarm_level_std) == (0.0, 0.0)
+    [threshold] = assess.gather([replace(space, free_rms=0.1, free_rms_std=0.01, free_max=0.3, crossings=1.0)])
+    assert threshold.alarm_level_std / threshold.alarm_level == pytest.approx(0.1)

@@ -131,3 +131,24 @@ def test_every_robot_has_a_fit_by_it_and_a_record_of_the_search():
     fits = {r.estimator: r for r in made if isinstance(r, Fit)}
     assert_allclose(fits["pso"].theta, fits["lse"].theta, atol=1e-3 * fits["lse"].theta_std_classical.min())
     assert [r.walls for r in made if isinstance(r, SwarmSearch)] == ["reflecting", "clipping"]
+
+
+def test_a_box_around_least_squares_holds_the_best_parameters_however_far_below_zero_those_are():
+    p = problem("instrument_slide", (2.5626, -3.0, 3.2723, 3.984), known=False)
+    box, best = pso.box_around(p.triangle, p), solve_bounded(p.triangle, p.known.positive)
+    assert p.triangle.theta[1] < -20 * np.ptp([box.lower[1], box.upper[1]]) / 100  # far beyond its error
+    assert np.all((box.lower <= best + 1e-9) & (best <= box.upper + 1e-9))
+    assert np.all(box.lower >= 0.0)
+
+
+def test_a_box_is_ten_standard_errors_wide_on_either_side_and_of_data_without_noise_no_wider_than_rounding():
+    p = problem("hand_roll", known=False)
+    R, box = p.triangle, pso.box_around(p.triangle, p)
+    free = Regression(p.Phi, p.tau, p.tau_var, p.periods, (0,), p.names)
+    wide = pso.box_around(R, free)
+    covariance = np.linalg.inv(p.Phi.T @ p.Phi * 10) * R.min_squares / (len(p.tau) - len(R.y))
+    assert_allclose(wide.upper - R.theta, pso.REACH * np.sqrt(np.diag(covariance)), rtol=1e-6)
+    assert np.all(box.lower >= 0.0)
+    exact = Regression(p.Phi, p.Phi @ R.theta, p.tau_var, p.periods, (0,), p.names)
+    assert np.ptp(exact.triangle.theta / R.theta) < 1e-9
+    assert np.all(np.abs(pso.box_around(exact.triangle, exact).upper / R.theta - 1.0) < 1e-6)
