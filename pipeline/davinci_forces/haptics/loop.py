@@ -22,6 +22,7 @@ from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.simulation.step import Friction
 from davinci_forces.maths.simulation.surroundings import Path
+from davinci_forces.records import HapticRun
 
 NO_PATH = np.zeros((0, 2))  # no prescribed path: the hand moves freely
 PRESS_FORCE, EXTRA_SHARE = 10.0, 0.3  # [N] steady force of a hand, and share of it that is released at once
@@ -194,28 +195,18 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     return model._replace(q_tau=walk)
 
 
-class Experiment(NamedTuple):
-    """The run of one hand until the plan's end, or until it leaves the device's reach; arrays are (K,)."""
+def experiment(scenario: HapticScenario, name: str, hand: Hand) -> HapticRun:
+    """Simulate the scenario's plan, sampled at the controller's rate, until its end or until the hand leaves the reach.
 
-    t: Array  # [s]
-    plan: Array  # [m]
-    x: Array
-    q: Array
-    true: Array  # [N]
-    felt: Array
-    thrown: bool  # whether the hand left the reach of the device
-    error: float  # [N] root mean square of felt force over force scale, minus true force
-
-
-def experiment(scenario: HapticScenario, hand: Hand) -> Experiment:
-    """Simulate the scenario's plan, sampled at the controller's rate."""
+    The error is the root mean square of felt force over force scale, minus true force.
+    """
     run = simulate_plan(scenario, hand)
     outside = np.flatnonzero(np.abs(run.x) > scenario.reach)
     samples = slice(0, int(outside[0]) if len(outside) else len(run.t), round(1.0 / scenario.rate / scenario.tick))
-    t = run.t[samples] + scenario.plan[0][0]
-    plan = Path(scenario.plan, ease=True).position(t)
-    error = run.felt[samples] / (scenario.device.force or math.nan) - run.true[samples]
-    return Experiment(
-        t, plan, run.x[samples], run.q[samples], run.true[samples], run.felt[samples], bool(len(outside)),
-        float(np.sqrt(np.mean(error**2))),
+    t, true, felt = run.t[samples] + scenario.plan[0][0], run.true[samples], run.felt[samples]
+    error = felt / (scenario.device.force or math.nan) - true
+    return HapticRun(
+        hand=name, out_of_reach=int(len(outside) > 0), true_peak=float(true.max()), felt_peak=float(felt.max()),
+        felt_error=float(np.sqrt(np.mean(error**2))), t=t, plan_x=Path(scenario.plan, ease=True).position(t),
+        hand_x=run.x[samples], arm_x=run.q[samples], true_force=true, felt_force=felt,
     )  # fmt: skip
