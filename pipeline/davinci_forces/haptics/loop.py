@@ -26,10 +26,7 @@ from davinci_forces.records import HapticRun
 
 NO_PATH = np.zeros((0, 2))  # no prescribed path: the hand moves freely
 PRESS_FORCE, EXTRA_SHARE = 10.0, 0.3  # [N] steady force of a hand, and share of it that is released at once
-RISE_TIME, RELEASE_TIME = (
-    1.0,
-    3.0,
-)  # [s] when the force has risen to steady force plus share, and when the share is released
+RISE_TIME, RELEASE_TIME = 1.0, 3.0  # [s] when the force has risen to steady force plus share; when it is released
 SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visible
 FREQUENCIES = np.geomspace(0.2, 30.0, 33)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
@@ -65,14 +62,9 @@ def complete_scenario(
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body
     return replace(
-        scenario,
-        body=body,
-        assumed_body=scenario.assumed_body or body,
-        noise=scenario.noise or noise,
-        stiffness=scenario.stiffness or stiffness,
-        q_tau=scenario.q_tau or q_tau,
-        filter_delay=delay,
-    )
+        scenario, body=body, assumed_body=scenario.assumed_body or body, noise=scenario.noise or noise,
+        stiffness=scenario.stiffness or stiffness, q_tau=scenario.q_tau or q_tau, filter_delay=delay,
+    )  # fmt: skip
 
 
 def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
@@ -157,12 +149,9 @@ def _axis(scenario: HapticScenario) -> Axis:
     body = scenario.body or SLIDE
     values = (body.viscous, *body.coulomb, *body.static, *body[5:])
     friction = Friction(*(np.array([float(x)]) for x in values))
-    low, high = scenario.stops
-    stops = (np.array([low]), np.array([high]))
-    return Axis(
-        np.array([[body.inertia]]), np.array([body.gravity]), friction, scenario.motor, scenario.law, stops,
-        scenario.exact,
-    )  # fmt: skip
+    low, high = (np.array([stop]) for stop in scenario.stops)
+    inertia, gravity = np.array([[body.inertia]]), np.array([body.gravity])
+    return Axis(inertia, gravity, friction, scenario.motor, scenario.law, (low, high), scenario.exact)
 
 
 def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]:
