@@ -50,21 +50,19 @@ def blocks(context: Context) -> Iterator[Block]:
             "stay below it."
         )
         yield peaks(contacts)
-        yield Table(
+        caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "Interval: 95 % confidence interval of the peak. Verdict: whether the peak exceeds the detection level; "
             "“peak only” if it does but stays below the alarm level; “found” for a contact outside the windows that "
-            "the study states.",
-            ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict"),
-            tuple(row for contact in contacts for row in rows(context, contact)),
-            "contact-table",
-            "llrrrrrrl",
-            largest(contacts),
+            "the study states."
         )
+        header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
+        every = tuple(row for contact in contacts for row in rows(context, contact))
+        yield Table(caption, header, every, "contact-table", "llrrrrrrl", largest(contacts))
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
-        header = ("Log", "Joint", "Reason, and remedy")
-        yield Table("Joints of logs on which no contact was measured.", header, unused, "not-analysed")
+        columns = ("Log", "Joint", "Reason, and remedy")
+        yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
 
 
 def largest(contacts: list[Contact]) -> tuple[int, ...]:

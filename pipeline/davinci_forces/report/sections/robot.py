@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from davinci_forces.records import Links, Pose, Workspace
 from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
+from davinci_forces.report.content.marks import Colour
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of
 
@@ -18,17 +19,14 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
         "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
         f"{worst} within the joints' limits: this factor can multiply the relative error of an effort."
     )
-    rows = tuple(
-        (
-            literal(link),
-            literal(links.parent[i]),
-            "–" if links.moved_by[i] == 0 else f"$q_{links.moved_by[i]}$",
-            *context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4),
-        )
-        for i, link in enumerate(links.link)
-    )
+    rows = []
+    for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):
+        moved_by = f"$q_{coordinate}$" if coordinate else "–"
+        numbers = context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4)
+        rows.append((literal(link), literal(parent), moved_by, *numbers))
     header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
-    yield Table("Denavit-Hartenberg parameters and masses of the links.", header, rows, "links-table", "lllrrrrr")
+    caption = "Denavit-Hartenberg parameters and masses of the links."
+    yield Table(caption, header, tuple(rows), "links-table", "lllrrrrr")
     yield chain(context)
 
 
@@ -48,16 +46,15 @@ def walk(pose: Pose) -> list[int]:
 
 def chain(context: Context) -> Figure3D:
     """The chain at three configurations, and the places that its tip reaches."""
-    colours = {"zero": "black", "low": "blue", "high": "vermillion"}
-    configurations = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
+    configurations: dict[str, tuple[str, Colour]] = {
+        "zero": ("q = 0", "black"), "low": ("lower limits", "blue"), "high": ("upper limits", "vermillion"),
+    }  # fmt: skip
     marks: list[Line3D | Points3D] = []
     for workspace in context.catalogue.records(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
     for pose in context.catalogue.records(Pose):
-        path = walk(pose)
-        marks.append(
-            Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
-        )
+        path, (name, colour) = walk(pose), configurations[pose.pose]
+        marks.append(Line3D(pose.x[path], pose.y[path], pose.z[path], name, colour))
     return Figure3D(
         "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
         "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",
