@@ -15,8 +15,8 @@ from uuid import uuid4
 
 from davinci_forces.errors import BadRequest, NotAFile
 
-# Size of files that a run writes.  Each log takes 70 kB of results.json and of the ledger's index: this is enough
-# for fifteen thousand logs, more than a study.toml has room for.
+# Size of files that a run writes.  Each log takes 70 kB of results.json: this is enough for fifteen thousand logs, more
+# than a study.toml has room for.
 MAX_BYTES = 1 << 30
 BLOCK_BYTES = 1 << 18  # bytes that are read at a time
 PARTIAL = ".partial"  # ends the name of a file that is still being written
