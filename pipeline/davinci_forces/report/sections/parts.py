@@ -148,7 +148,7 @@ def normal_plot(title: str, x: Column, axis: str) -> Panel:
     return Panel(title, "normal quantile", axis, (Points(scores[shown], ordered[shown], "", "blue"), line))
 
 
-def unfitted(context: Context, predictions: list[Prediction]) -> list[Prediction]:
+def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Prediction]:
     """The predictions of free motion in logs that no fit uses; all of them if there is none."""
     return [
         p

@@ -14,7 +14,7 @@ from davinci_forces.report.sections.parts import (
     run_cells,
     run_name,
     section_of,
-    unfitted,
+    of_free_motion,
 )
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
@@ -46,7 +46,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield from paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
     scores = (*estimators(context, predictions), every_score(context, predictions))
     yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
-    unseen = unfitted(context, used)
+    unseen = of_free_motion(context, used)
     joints = dict.fromkeys(p.joint for p in unseen)
     worst = [max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error) for joint in joints]
     worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))  # the worst of all on paper
@@ -96,7 +96,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
     """The model error of one fit in the worst run of a joint that was not fitted."""
     of_joint = [p for p in predictions if p.joint == joint]
-    unseen = [p for p in unfitted(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
+    unseen = [p for p in of_free_motion(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
     if not unseen:
         return "–"
     return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)

@@ -29,7 +29,7 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import is_of_link, run_name, unfitted
+from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name
 from davinci_forces.report.verdicts import is_impossible
 
 SIGNED_FRICTION = ("Coulomb friction", "presliding friction", "smooth friction")  # with the sign of the velocity
@@ -129,7 +129,7 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     predictions = context.catalogue.select(Prediction, joint=joint, model=CHOSEN)
     if all(p.role == "identification" for p in predictions):
         return text
-    worst = max(unfitted(context, predictions), key=lambda p: p.relative_error)
+    worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
     before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
     after = context.number(f"{worst.prefix}.relative_error", 3)
     where = f"Of the logs that were not fitted, its relative error (noise included) is largest in {literal(worst.log)}"
