@@ -47,7 +47,7 @@ def blocks(context: Context) -> Iterator[Block]:
             "includes the smoother's standard deviation there, and the height by which smoothing flattens the peak. "
             "The standard error of a mean also includes the effort that smoothing moves out of the window. Peaks are "
             "judged by the detection level, which is lower: 99 % of the samples of the joint's worst run in free space "
-            "stay below it."
+            f"stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)
         caption = (
@@ -63,6 +63,12 @@ def blocks(context: Context) -> Iterator[Block]:
     if unused:
         columns = ("Log", "Joint", "Reason, and remedy")
         yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
+
+
+def alarm_levels(context: Context, contacts: list[Contact]) -> str:
+    """The alarm level of each joint, in words."""
+    joints = dict.fromkeys(contact.joint for contact in contacts)
+    return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
 
 
 def largest(contacts: list[Contact]) -> tuple[int, ...]:

@@ -1,6 +1,9 @@
 """The robot that the analysis assumes: its kinematic chain, its links, and the workspace of its tip."""
 
+from collections import Counter
 from collections.abc import Iterator
+
+import numpy as np
 
 from davinci_forces.records import Links, Pose, Workspace
 from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
@@ -13,9 +16,15 @@ from davinci_forces.report.sections.parts import section_of
 def section(context: Context, records: list[Links]) -> Iterator[Block]:
     """The chain and its table.  Tables 3.1, 4.2, Fig 3.5"""
     links, worst = records[0], context.results["robot.worst_condition"].number(3)
+    tabulated = not np.isnan(links.alpha).all()
+    chain_kind = "a Denavit-Hartenberg chain" if tabulated else "a tree of links"
+    shared = max(Counter(links.moved_by[links.moved_by > 0].tolist()).values(), default=0) > 1
+    parallelogram = (
+        "The links of the parallelogram share a coordinate, so the tool pivots about a remote centre without a bearing "
+        "there. "
+    )
     yield Prose(
-        f"The {literal(context.study.robot.title)} is modelled as a Denavit-Hartenberg chain. The parallelogram's "
-        "links share the coordinate of the pitch, so the tool pivots about a remote centre without a bearing there. "
+        f"The {literal(context.study.robot.title)} is modelled as {chain_kind}. {parallelogram if shared else ''}"
         "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
         f"{worst} within the joints' limits: this factor can multiply the relative error of an effort."
     )
@@ -25,8 +34,8 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
         numbers = context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4)
         rows.append((literal(link), literal(parent), moved_by, *numbers))
     header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
-    caption = "Denavit-Hartenberg parameters and masses of the links."
-    yield Table(caption, header, tuple(rows), "links-table", "lllrrrrr")
+    caption = "Denavit-Hartenberg parameters and masses" if tabulated else "Joints and masses"
+    yield Table(f"{caption} of the links.", header, tuple(rows), "links-table", "lllrrrrr")
     yield chain(context)
 
 
