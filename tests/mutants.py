@@ -167,8 +167,9 @@ class Tree:
         whole = file.read_bytes()
         try:
             replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
-            if mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
-                shutil.copytree(self.compiled, self.folder_of_compiled_code(), dirs_exist_ok=True)
+            compiled = self.folder_of_compiled_code()
+            if compiled != self.compiled and mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
+                shutil.copytree(self.compiled, compiled, dirs_exist_ok=True)
             return self.failing_test(tests_for(mutant))
         finally:
             replace_source(file, whole)
