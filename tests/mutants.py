@@ -161,15 +161,20 @@ class Tree:
         )
         return Path(answer.stdout.strip())
 
+    def reuse_compiled_code(self) -> None:
+        """Let the sources as they are now find the code that was compiled for those without a mutant."""
+        folder = self.folder_of_compiled_code()
+        if folder != self.compiled:
+            shutil.copytree(self.compiled, folder, dirs_exist_ok=True)
+
     def notices(self, mutant: Mutant) -> str:
         """Return the test that fails with a mutant; "" if none does."""
         file = self.root / mutant.file
         whole = file.read_bytes()
         try:
             replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
-            compiled = self.folder_of_compiled_code()
-            if compiled != self.compiled and mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
-                shutil.copytree(self.compiled, compiled, dirs_exist_ok=True)
+            if mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
+                self.reuse_compiled_code()
             return self.failing_test(tests_for(mutant))
         finally:
             replace_source(file, whole)
