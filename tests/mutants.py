@@ -94,7 +94,7 @@ def draw(seed: int, count: int) -> list[Mutant]:
 
 
 def tests_for(mutant: Mutant) -> list[str]:
-    """Return the test files for a mutant: those that import its module, the small studies, those of its importers."""
+    """Return the test files for a mutant: those that import its module, the small studies, those near to it."""
     dotted = dotted_name(ROOT / mutant.file)
     sources = {p: p.read_text() for p in (ROOT / PACKAGE).rglob("*.py")}
     importers = [p for p, text in sources.items() if imports(text, dotted)]
@@ -102,6 +102,9 @@ def tests_for(mutant: Mutant) -> list[str]:
     near.append(dotted.rpartition(".")[0])  # choices of a room are imported by name
     files = {p: p.read_text() for p in sorted((ROOT / "tests").rglob("test_*.py")) if "benchmarks" not in p.parts}
     rank = {p: 0 if imports(t, dotted) else 2 if any(imports(t, n) for n in near) else 4 for p, t in files.items()}
+    helpers = [p for p in (ROOT / "tests").rglob("*.py") if p not in files and imports(p.read_text(), dotted)]
+    names = [p.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for p in helpers]
+    rank = {p: min(rank[p], 3) if any(imports(t, name) for name in names) else rank[p] for p, t in files.items()}
     rank[ROOT / SMALL_STUDIES] = 1
     for name in ("contracts/test_stages.py", "contracts/test_sections.py", "contracts/test_results.py"):
         rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 3)

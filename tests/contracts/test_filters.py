@@ -235,6 +235,23 @@ def test_the_momentum_observers_deviation_is_that_of_its_noise():
     assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.05)
 
 
+def test_the_momentum_observers_deviation_is_exact_for_noise_of_the_effort_alone():
+    """Of a first-order lag over white noise, over so many samples that its deviation is known to half a per cent."""
+    N = 400_000
+    noise, joint = NOISE._replace(q_dq=2e-3, r_dq=1e-9, q_tau=0.02), arm.dynamics((inertia,), THETA[:1], N)
+    effort = THETA[0] * noise.q_dq / T_S * np.random.default_rng(1).standard_normal(N)
+    made = tracker("momentum")(recording(joint, np.zeros(N), np.zeros(N), effort), noise)
+    assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.015)
+
+
+def test_the_momentum_observer_takes_the_sign_of_a_slow_velocity_as_it_is():
+    joint, theta = arm.joint("hand_roll"), arm.THETA["hand_roll"]
+    q, dq = 0.003 * T_S * np.arange(300), np.full(300, 0.003)
+    tau = regressor(joint.terms, q, dq, np.zeros(300)) @ theta
+    made = tracker("momentum")(recording(arm.dynamics(joint.terms, theta, 300), q, dq, tau), NOISE)
+    assert_allclose(made.tau_ext, 0.0, atol=1e-12)
+
+
 def test_measurement_noise_that_grows_is_noticed_only_by_the_filter_that_adapts():
     """Of a velocity whose noise grows tenfold halfway, its innovations stay as large as it says."""
     N, random, joint = 8000, np.random.default_rng(0), arm.dynamics((inertia, viscous), THETA[:2], 8000)
