@@ -157,6 +157,29 @@ def test_a_robot_file_is_taken_where_it_fits_and_never_overwritten(tmp_path):
     assert sorted(p.name for p in tmp_path.glob("*.toml")) == ["arm.toml", "robot.toml", "study.toml"]
 
 
+def test_a_written_robot_has_the_limits_that_the_logs_reach(tmp_path):
+    t, q, dq = motion(2)
+    wide = q * [1.0, 10.0]
+    new(table(tmp_path / "run.csv", t, wide, dq * [1.0, 10.0], effort(q, dq)))
+    moderate, may_be_degrees = (joint.limits for joint in robots.load("robot.toml", tmp_path).joints)
+    low, high = q[:, 0].min(), q[:, 0].max()
+    assert moderate.q == pytest.approx((low, high), abs=0.1 * max(-low, high))
+    assert moderate.q[0] <= low + 0.01
+    assert moderate.q[1] >= high - 0.01
+    assert moderate.dq[1] == -moderate.dq[0] == pytest.approx(np.abs(dq[:, 0]).max(), rel=0.1)
+    assert not np.isfinite([*may_be_degrees.q, *may_be_degrees.dq]).any()
+
+
+def test_a_robot_file_outside_the_study_is_refused_at_once(tmp_path):
+    t, q, dq = motion(2)
+    file = table(tmp_path / "mine" / "run.csv", t, q, dq, effort(q, dq))
+    new(table(tmp_path / "other" / "run.csv", t, q, dq, effort(q, dq)))
+    for robot in ("../other/robot.toml", "robot.toml"):
+        says = call("new", file, "--robot", robot, code=1)
+        assert f"--robot {robot}: copy that file into {file.parent}, beside study.toml" in says
+    assert [path.name for path in file.parent.iterdir()] == ["run.csv"]
+
+
 def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
     made = {}
     for seed, (name, repeats) in enumerate({"a": True, "b": False, "c_noweight": True, "d_205g": True}.items()):

@@ -69,7 +69,7 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ('title = "T"', "title = 3", "1: title must be text, not 3"),
         ('title = "T"', 'titel = "T"', "1: unknown key 'titel'; known keys are title, robot"),
         ('robot = "davinci"', 'robot = "davinchi"', "2: there is no robot 'davinchi'; name one of davinci, "),
-        ('robot = "davinci"', 'robot = "../arm.toml"', "2: robot '../arm.toml' lies outside the study"),
+        ('robot = "davinci"', 'robot = "../arm.toml"', "2: robot '../arm.toml' lies outside the study; copy"),
         ('robot = "davinci"', 'robot = "arm.toml"', "there is no such robot file"),
         ('name = "a"', 'name = "A b"', "4: log name 'A b' may have only lower-case letters, digits, _ and -"),
         ('name = "a"', "", "3: log 1 has no name"),
