@@ -12,6 +12,7 @@ import davinci_forces
 from davinci_forces import robots
 from davinci_forces.maths.signals import columns
 from davinci_forces.study import reading
+from tests.simulation.six_joints import write
 from tests.test_runs import call
 
 RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
@@ -104,6 +105,15 @@ def test_a_joint_at_rest_stays_commented_out_with_the_reason(tmp_path):
     new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
     assert not any(quantity.startswith("joint_3.") for quantity in held(tmp_path))
     assert '# "joint_3.q" = "column_3"  # the joint does not move' in (tmp_path / "study.toml").read_text()
+
+
+def test_a_joint_at_rest_of_an_arm_with_a_chain_keeps_its_channels(tmp_path):
+    """A model of the whole arm takes no log without them."""
+    t, q, dq = motion(6)
+    q[:, 2:], dq[:, 2:] = 0.7, 0.0
+    write(tmp_path)
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    assert {"elbow.q", "elbow.dq", "elbow.tau", "wrist-3.tau"} <= held(tmp_path).keys()
 
 
 @pytest.mark.parametrize(
