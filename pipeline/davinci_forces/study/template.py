@@ -358,7 +358,7 @@ class _Writer:
                 yield f'# "<joint>.<quantity>" = {_text(channel.name)}{unit}'
 
     def _meaning_line(self, channel: Channel, meaning: Meaning, unit_unknown: bool) -> str:
-        """The line of a joint's channel; commented out where the joint is unknown, or moves not and has no chain."""
+        """The line of a joint's channel; commented out where the joint does not move or is unknown."""
         if meaning.joint >= len(self.robot.joints):
             count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
             return f'# "<joint>.{meaning.symbol}" = {_text(channel.name)}  # {count}'
@@ -373,9 +373,8 @@ class _Writer:
             note = f"MISSING: the unit is deg{rate} or rad{rate}; the angle exceeds a turn if it is in rad"
         line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
-            if self.robot.chain is None:
-                return f"# {line}  # the joint does not move"
-            note = f"{note}; the joint does not move, but a model of the whole arm takes logs of all joints alone"
+            effect = "; without it, no model of the whole arm is fitted to this log" if self.robot.chain else ""
+            return f"# {line}  # the joint does not move{effect}"
         return f"{line}  # {meaning.reason}; {note}"
 
 

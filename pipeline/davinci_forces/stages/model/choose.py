@@ -134,7 +134,7 @@ def not_of_arm(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
         if lacking:
             first = log.records[0]
             text = f"{first.log}: no model of the whole arm is fitted to this log, as it lacks {join_names(lacking)}"
-            remedy = f"name their channels, on the clock of {first.joint}, also where a joint does not move"
+            remedy = f"to fit it, name their channels, on the clock of {first.joint}, also where a joint does not move"
             yield diagnostic("choose", "arm", "warning", f"{text}; {remedy}")
 
 
