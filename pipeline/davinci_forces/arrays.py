@@ -28,6 +28,8 @@ from davinci_forces.records import (
     Track,
     store,
 )
+from davinci_forces.report.answer import align
+from davinci_forces.report.content import Number
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.results.dataframes import as_frame
@@ -224,6 +226,13 @@ class IdentifiedArm:
         axes[0].legend(loc="upper right")
         axes[-1].set_xlabel("time [s]")
         return axes
+
+    def __repr__(self) -> str:
+        """The parameters as a table: joint, parameter, value ± standard error, unit."""
+        rows = self.parameters.itertuples()
+        table = [("joint", "parameter", "value", "unit")]
+        table += [(row.group, row.parameter, Number(row.value, std=row.std).text, row.unit) for row in rows]
+        return "\n".join(align(table))
 
     def _repr_html_(self) -> str:
         return as_html([self.parameters.set_index("group")], self.diagnostics)
