@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.records import Stiffness, Weight
 from davinci_forces.report.content import Prose, Verdict, literal
-from davinci_forces.report.context import Context, count
+from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent, stiffness_level
 from davinci_forces.study.review import STUDY
@@ -30,14 +30,15 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that can be believed, and what limits the others."""
     fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow]
     levels = [
-        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on the {name_in_sentence(t.joint)}"
+        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on {name_in_sentence(t.joint)}"
         for t in fine
         if t.space is not None
     ]
     parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine])
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
-    which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
+    narrow[1:] = [name.removeprefix("the ") for name in narrow[1:]]
+    which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
         parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["all 95 % bands are wide enough"]
     text = "; ".join(parts) or "no effort was estimated in free space"
@@ -48,7 +49,7 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
     """State the model errors of joints that are not fine, those of one kind of path and one verdict together."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for trusted in trusts:
-        name = f"the {name_in_sentence(trusted.joint)}"
+        name = name_in_sentence(trusted.joint)
         path = "the fitted path" if trusted.same_path else "an unseen path"
         level, error = trusted.level, f"{percent(trusted.share)} on {name}"
         if trusted.fineness > DETECTABLE:
@@ -57,11 +58,6 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
     for (path, why), joints in kinds.items():
         follows = why or f"so judge {'its' if len(joints) == 1 else 'their'} efforts with caution"
         yield f"on {path} the model errs by {as_list(joints)}, {follows}"
-
-
-def name_in_sentence(joint: str) -> str:
-    """The name of a joint within a sentence."""
-    return literal(joint.replace("_", " "))
 
 
 def as_list(parts: Sequence[str]) -> str:
