@@ -122,6 +122,8 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ),
         ("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 0\n[[log]]",
             "4: robot_overrides.hand_roll: gear_ratio must be a number other than 0, not 0"),
+        ("[[log]]", '[robot_overrides.hand_roll]\ntitle = "Rig"\n[[log]]',
+            "4: robot_overrides.hand_roll: title is not shown: reports name a joint by its name"),
         ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]",
             "4: robot_overrides.hand_roll: unknown key 'gears'; known keys are title, terms"),
         ("[[log]]", "tool = { length = 0.4 }\n[[log]]", "3: robot davinci has no known tool in its chain"),
