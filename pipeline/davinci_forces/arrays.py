@@ -229,9 +229,10 @@ class IdentifiedArm:
 
     def __repr__(self) -> str:
         """The parameters as a table: joint, parameter, value ± standard error, unit."""
-        rows = self.parameters.itertuples()
         table = [("joint", "parameter", "value", "unit")]
-        table += [(row.group, row.parameter, Number(row.value, std=row.std).text, row.unit) for row in rows]
+        for fit in self.record:
+            rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
+            table += [(fit.group, name, Number(value, std=std).text, unit) for name, value, std, unit in rows]
         return "\n".join(align(table))
 
     def _repr_html_(self) -> str:
