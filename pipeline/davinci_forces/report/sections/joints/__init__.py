@@ -64,7 +64,6 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     used = context.used_record(joint) or plain
     yield equation(joint, used)
     yield parameters(context, joint, used)
-    yield from sliding_friction(joint, used)
     if used is not plain:
         yield Prose(compared_with_plain(context, joint, used, plain))
     model, by = (used.model, used.estimator) if used is plain else (CHOSEN, f"{used.model}.{used.estimator}")
@@ -98,13 +97,14 @@ def equation(joint: str, fit: Fit) -> Equation:
     return Equation(f"tau = {' + '.join(terms)}", f"effort is the sum of {', '.join(names)}, each times its parameter")
 
 
-def sliding_friction(joint: str, fit: Fit) -> Iterator[Prose]:
-    """State the friction far from rest, where the terms that change sign with the velocity add up."""
+def sliding_friction(joint: str, fit: Fit) -> str:
+    """State the friction far from rest, where the terms that change sign with the velocity add up; "" if one does."""
     names = {i: str(fit.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(fit, joint)}
     rows = [i for i, name in names.items() if name.startswith(SIGNED_FRICTION) and "," not in name]
-    if len(rows) > 1:
-        effort = Number(float(fit.theta[rows].sum()), format_unit(str(fit.unit[rows[0]])), digits=3)
-        yield Prose(f"Far from rest, {' and '.join(names[i] for i in rows)} add up to {effort}.")
+    if len(rows) < 2:
+        return ""
+    effort = Number(float(fit.theta[rows].sum()), format_unit(str(fit.unit[rows[0]])), digits=3)
+    return f" Far from rest, {' and '.join(names[i] for i in rows)} add up to {effort}."
 
 
 def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
@@ -170,7 +170,7 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
-        f"Mean squared error of the effort{whose}: {mse}.{coupled}"
+        f"Mean squared error of the effort{whose}: {mse}.{sliding_friction(joint, fit)}{coupled}"
     )
     return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
 
