@@ -30,7 +30,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "only, each of its periods is left out in turn. On the fitted path the fit absorbs part of the model's error, "
         "so scores there are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "after the noise variance is subtracted. "
+        "both low-passed, after the noise variance is subtracted. "
         "Samples at which the joint stands still are left out, as friction can then take any value. A contact log "
         "whose windows the study does not state is scored with its contacts, so it is no worst run."
     )

@@ -45,6 +45,7 @@ from davinci_forces.report.verdicts import (
 from davinci_forces.robots.robot import Kind
 
 SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
+FIRST_OF_ALL = 100.0  # weight of such a warning
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -134,21 +135,21 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     contacts_in_words = count(windows, "contact")
     peaks = largest_peaks(context, contacts)
     if not any(contact.stated.any() for contact in contacts):
-        return f"{text} **{contacts_in_words} found above the alarm level; the study states none. {peaks}**"
-    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level. {peaks}**"
+        return f"{text} **{contacts_in_words} found above the alarm level; the study states none.{peaks}**"
+    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level.{peaks}**"
 
 
 def largest_peaks(context: Context, contacts: list[Contact]) -> str:
     """State the largest peak of each joint with its standard error, and the log."""
     joints: dict[str, list[tuple[float, str, int]]] = {}
-    for contact in contacts:
-        row = int(np.argmax(np.abs(contact.peak)))
+    for contact in (contact for contact in contacts if contact.above.any()):
+        row = int(np.argmax(np.abs(contact.peak) * contact.above))
         joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1))
     peaks = [
         f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)})"
         for joint, (_, log, number) in ((joint, max(largest)) for joint, largest in joints.items())
     ]
-    return f"Largest: {as_list(peaks)}."
+    return f" Largest: {as_list(peaks)}." if peaks else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -214,9 +215,10 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     )  # fmt: skip
     caption = (
         "Trust in the estimates. New path: share of the run's motion that is unlike any fitted path. Model error: RMS "
-        "of measured minus modelled effort, without noise. Error/effort: model error over the RMS of the measured "
-        "effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
-        "free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
+        "of measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of "
+        "the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % "
+        "of free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard "
+        "error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
@@ -254,7 +256,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     for diagnostic in context.catalogue.records(Diagnostic):
         for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True):
             if severity == "warning":
-                yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text.replace("`", ""))
+                yield FIRST_OF_ALL if diagnostic.stage in SPOILS_ALL else 1.5, literal(text.replace("`", ""))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
