@@ -216,8 +216,8 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     caption = (
         "Trust in the estimates. New path: share of the run's motion that is unlike any fitted path. Model error: RMS "
         "of measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of "
-        "the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % "
-        "of free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard "
+        "the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 "
+        "% of free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard "
         "error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
