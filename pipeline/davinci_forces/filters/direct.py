@@ -3,12 +3,19 @@
 tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Measured minus model"
+
+
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
+    """Subtract block by block."""
+    return ((rows, track(part, noise)) for rows, part in input_blocks(recording))
 
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:

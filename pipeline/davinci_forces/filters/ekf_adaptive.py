@@ -6,10 +6,12 @@ R stays between 0.1 and 1000 times the tuned variance, so that the filter does n
 else is as in `ekf`.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, join_blocks
 
 NAME = "Extended Kalman filter, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
@@ -17,6 +19,11 @@ WINDOW = 1.0  # [s] time constant of the mean
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k."""
+    return join_blocks(blocks(recording, noise), recording.samples)
+
+
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
+    """Filter a recording block by block."""
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)
-    return Tracked(*kalman.run_filter(recording, model))
+    return kalman.run_blocks(recording, model)

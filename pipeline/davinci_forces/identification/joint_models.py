@@ -1,7 +1,6 @@
 """The model of each joint along a log, as a filter takes it, and the effort that a fit predicts along the log."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -97,7 +96,7 @@ class LogModels:
     def with_fit(self, model: JointModel, fit: Fit) -> JointModel:
         """Return a joint's model by another fit, without predictions of unseen data."""
         unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
-        return replace(model, **self.fields_of(fit, model.joint), **unknown)
+        return JointModel.derive(model, **self.fields_of(fit, model.joint), **unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:

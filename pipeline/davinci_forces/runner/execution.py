@@ -16,6 +16,7 @@ from davinci_forces.files import digest
 from davinci_forces.logs.joined import open_joined
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.logs.parts import open_parts
+from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic, store
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
@@ -127,7 +128,7 @@ def _record(folders: Folders, task: Task, located: Located) -> Record:
 
 
 def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
-    return store.read(KINDS[kind], folder, Path(place), sha256)
+    return store.read(KINDS[kind], folder, Path(place), sha256, BLOCK_SAMPLES)
 
 
 _read_cached = lru_cache(maxsize=256)(_read)

@@ -76,8 +76,9 @@ def run(
             noise = noises[model.joint]
             causal = along.with_fit(model, fit)
             estimate = filter_parts(
-                DEFAULT, filter_inputs(causal), noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau)
-            )
+                DEFAULT, filter_inputs(causal), noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau),
+                ("tau_ext", "nis"),
+            )  # fmt: skip
             if not diverges(estimate):
                 yield from compare(track, estimate.tau_ext - track.day_offset, found, entry, late, noise.delay)
 

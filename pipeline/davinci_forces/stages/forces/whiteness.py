@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters.innovations.innovations import Innovations, correct_times, delays, innovations
-from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
+from davinci_forces.filters.innovations.search import MAX_SAMPLES_SEARCH, CauseSearch, classify, search, verdict
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
-from davinci_forces.filters.problem import FilterInput, filter_inputs
+from davinci_forces.filters.problem import FilterInput, Recording, filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import LogModels, refit_effort
 from davinci_forces.identification.used import Identified
@@ -134,8 +134,10 @@ def apply(
         yield from innovation_records(model, result, motion)
         trials = dict(alternatives(model, along, free))
         if delay.any():
-            trials[CLOCK] = correct_times(longest_part(model), *motion, delay)
-        subject = Subject(trials, noise, free[part], is_far_from_reversals(motion[0], 1.0 / model.rate))
+            first = slice(MAX_SAMPLES_SEARCH)
+            trials[CLOCK] = correct_times(tried_part(model), *(x[first] for x in (*motion, delay)))
+        moving = is_far_from_reversals(motion[0], 1.0 / model.rate)
+        subject = Subject(trials, noise, free[part][:MAX_SAMPLES_SEARCH], moving[:MAX_SAMPLES_SEARCH])
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
@@ -145,24 +147,30 @@ def velocities(model: JointModel) -> tuple[Array, Array]:
     return model.dq[part], model.ddq[part]
 
 
-def longest_part(model: JointModel, tau_hat: Array | None = None) -> FilterInput:
+def longest_part(model: JointModel, tau_hat: Array | None = None) -> Recording:
     """The longest run of a joint's recording; `tau_hat` (N,) is the effort by another fit."""
-    return max(filter_inputs(model, tau_hat), key=lambda part: len(part.q))
+    return max(filter_inputs(model, tau_hat), key=lambda part: part.samples)
+
+
+def tried_part(model: JointModel, tau_hat: Array | None = None) -> FilterInput:
+    """The samples of the longest run in which causes are searched for."""
+    longest = longest_part(model, tau_hat)
+    return longest.part(slice(0, min(longest.samples, MAX_SAMPLES_SEARCH)))
 
 
 def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterator[tuple[str, FilterInput]]:
     """The joint under the model in use, with parameters fitted to this log, and under another structure."""
     identified, joint = along.identified, model.joint
     fit = identified.fit_of(joint, f"{model.model}.{model.estimator}")
-    yield "", longest_part(model)
+    yield "", tried_part(model)
     if fit is not None:
-        yield THIS_LOG, longest_part(model, refit_effort(model, fit, along, free))
+        yield THIS_LOG, tried_part(model, refit_effort(model, fit, along, free))
     structures = [f for f in identified.fits if f.group == joint and f.model != model.model]
     possible = [f for f in structures if set(along.joints) >= set(identified.model(f).joints)]
     for alternative in possible[:1]:  # of the models whose joints the log contains
         under = along.with_fit(model, alternative)
         if under.inertia.min() > 0:
-            yield alternative.model, longest_part(under)
+            yield alternative.model, tried_part(under)
 
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:

@@ -130,16 +130,13 @@ def apply(
             continue
         path = SAME_PATH if is_fitted else identified.path(motion)
         refit = refits.get(motion.joint)
-        model = JointModel(
-            log=motion.log, joint=motion.joint, role=motion.role, stand_in=stand_in, path=path,
-            scheme=refit.scheme if refit else "" if is_fitted else motion.role,
+        model = JointModel.derive(
+            motion, stand_in=stand_in, path=path, scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
-            rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
-            tau=motion.tau, segment=motion.segment,
             unscored=unscored_flags(motion, is_scored(motion, along, joint_fit, entry)),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
-        yield model
+        yield from model.blocks()
         if is_fitted and fit == CHOSEN and not motion.at_rest:
             yield residual_of(model, periods.get(motion.joint))
 
