@@ -97,7 +97,7 @@ class Record:
         scalars = {name: changes[name] if name in changes else getattr(source, name) for name in cls.scalars()}
         if read := source.__dict__.get("_read"):
             return cls.lazy(scalars, len(source), lambda name, rows: (
-                changes[name][rows] if name in changes else read(name, rows)
+                changes[name][rows].copy() if name in changes else read(name, rows)
             ))  # fmt: skip
         columns = {name: changes[name] if name in changes else getattr(source, name) for name in cls.columns()}
         return cls(**scalars, **columns)

@@ -27,6 +27,8 @@ from davinci_forces.records.quantities import QUANTITIES
 
 Unit = Callable[[str], str]
 
+MMAP_THRESHOLD = -3  # glibc's number of the size from which it maps memory
+
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
 
 
@@ -181,10 +183,19 @@ def _rows_of(kind: type[Record], whole: Path, name: str, which: slice) -> np.nda
 
 
 def release() -> None:
-    """Return to the system the memory that Arrow and the C library retain after a task."""
-    pa.default_memory_pool().release_unused()
+    """Return to the system the memory that the C library retains after a task."""
     with suppress(OSError, AttributeError):  # only glibc has this function
         CDLL(None).malloc_trim(0)
+
+
+def _return_columns() -> None:
+    """Have the memory of a long column returned to the system as soon as it is free."""
+    pa.set_memory_pool(pa.system_memory_pool())
+    with suppress(OSError, AttributeError):
+        CDLL(None).mallopt(MMAP_THRESHOLD, 8 * 2 * BLOCK_SAMPLES)
+
+
+_return_columns()
 
 
 def leftovers(folder: Path) -> Iterator[Path]:
