@@ -91,7 +91,8 @@ def signal(
     q = q + noise * 1e-4 * rng.normal(size=len(t))
     dq = dq + noise * 1e-3 * rng.normal(size=len(t))
     at_rest = int(np.ptp(q) < 0.01)
-    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": np.zeros(len(t), int)}
+    zero = np.zeros(len(t), int)
+    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": zero, "filled": zero}
     return Signal(log, name, role, rate, "as recorded", "logged", 0, at_rest, **columns)
 
 

@@ -1,8 +1,8 @@
 """Change the code in one place at a time, and see whether a test fails: `make mutants` (SEED=n, COUNT=n).
 
-A mutant is one operator, comparison or number of a module that is changed to another.  Test files that import the
-module run first, then those that import what imports it, up to `MAX_FILES`.  A mutant that no
-test notices survives: either a test is missing, or the change is of no consequence.
+A mutant is one operator, comparison or number of a module that is changed to another.  Up to `MAX_FILES` test files
+run, until a test fails: those that import the module and the small study, then those that import what imports it.  A
+mutant that no test notices survives: either a test is missing, or the change is of no consequence.
 """
 
 import argparse
@@ -15,8 +15,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
+
+import pytest
+
+from davinci_forces.maths.compiled import SOURCES
+from davinci_forces.runner.fingerprints.code import code
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "pipeline/davinci_forces"
@@ -26,8 +32,9 @@ OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
     ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
+SMALL_STUDY = "tests/contracts/test_approved.py"
 MAX_FILES = 12  # test files of a mutant
-TIMEOUT = 600  # [s]; a mutant that never ends is noticed
+TIMEOUT = 3600  # [s]; a mutant that never ends is noticed
 
 
 class Mutant(NamedTuple):
@@ -87,18 +94,18 @@ def draw(seed: int, count: int) -> list[Mutant]:
 
 
 def tests_for(mutant: Mutant) -> list[str]:
-    """Return the test files for a mutant, those that import its module first."""
-    dotted = mutant.file.removeprefix("pipeline/").removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    """Return the test files for a mutant: those that import its module, the small studies, those of its importers."""
+    dotted = dotted_name(ROOT / mutant.file)
     sources = {p: p.read_text() for p in (ROOT / PACKAGE).rglob("*.py")}
     importers = [p for p, text in sources.items() if imports(text, dotted)]
-    near = [p.relative_to(ROOT / "pipeline").with_suffix("").as_posix().replace("/", ".") for p in importers]
+    near = [dotted_name(p) for p in importers]
     near.append(dotted.rpartition(".")[0])  # choices of a room are imported by name
     files = {p: p.read_text() for p in sorted((ROOT / "tests").rglob("test_*.py")) if "benchmarks" not in p.parts}
-    rank = {p: 0 if imports(t, dotted) else 1 if any(imports(t, n) for n in near) else 3 for p, t in files.items()}
-    rank[ROOT / "tests" / "contracts" / "test_approved.py"] = 0
+    rank = {p: 0 if imports(t, dotted) else 2 if any(imports(t, n) for n in near) else 4 for p, t in files.items()}
+    rank[ROOT / SMALL_STUDY] = 1
     for name in ("contracts/test_stages.py", "contracts/test_sections.py", "contracts/test_results.py"):
-        rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 2)
-    chosen = sorted((p for p in rank if rank[p] < 3), key=lambda p: (rank[p], p))[:MAX_FILES]
+        rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 3)
+    chosen = sorted((p for p in rank if rank[p] < 4), key=lambda p: (rank[p], p))[:MAX_FILES]
     return [p.relative_to(ROOT).as_posix() for p in chosen]
 
 
@@ -106,28 +113,79 @@ def imports(text: str, dotted: str) -> bool:
     """Whether a source imports a module, by its whole name or from its package."""
     package, _, name = dotted.rpartition(".")
     return bool(re.search(rf"(?m)^\s*(from|import) {re.escape(dotted)}\b", text)) or bool(
-        re.search(rf"(?ms)^\s*from {re.escape(package)} import [^\n]*\b{re.escape(name)}\b", text)
+        re.search(rf"(?m)^\s*from {re.escape(package)} import (\([^)]*|[^\n]*)\b{re.escape(name)}\b", text)
     )
 
 
-def is_noticed(mutant: Mutant, tree: Path) -> str:
-    """Return the test that fails with a mutant in a copy of the tree; "" if none does."""
-    file = tree / mutant.file
-    whole = file.read_bytes()
-    try:
-        replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
-        for test in tests_for(mutant):
-            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
-            environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(tree / "pipeline")}
-            try:
-                done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, timeout=TIMEOUT)
-            except subprocess.TimeoutExpired:
-                return f"{test} (it does not end)"
-            if done.returncode not in (0, 5):
-                return test
-    finally:
-        replace_source(file, whole)
-    return ""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave the tests that take seconds to the end of a run, which the others may end before."""
+    items.sort(key=lambda item: "medium" in item.keywords)
+
+
+class Tree:
+    """A copy of the project in which tests run; its compiled code serves the mutants that it does not depend on."""
+
+    def __init__(self, folder: Path) -> None:
+        self.root = folder / "tree"
+        left_out = shutil.ignore_patterns(".git", ".venv", "processed", "reports", ".*_cache")
+        shutil.copytree(ROOT, self.root, ignore=left_out)
+        for name in ("processed", "reports"):
+            (self.root / name).mkdir()
+        self.environment = os.environ | {
+            "PYTHONDONTWRITEBYTECODE": "",
+            "PYTHONPATH": str(self.root / "pipeline"),
+            "NUMBA_CACHE_DIR": str(folder / "compiled"),
+        }
+        if failed := self.failing_test([SMALL_STUDY]):
+            raise SystemExit(f"without a mutant, a test fails: {failed}")
+        self.compiled = self.folder_of_compiled_code()
+
+    def failing_test(self, files: list[str]) -> str:
+        """Return the first test that fails; "" if none does."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "tests.mutants", *files]
+        try:
+            run = subprocess.run(
+                command, cwd=self.root, env=self.environment, capture_output=True, timeout=TIMEOUT, text=True
+            )
+        except subprocess.TimeoutExpired:
+            return "it does not end"
+        failed = re.search(r"(?m)^(?:FAILED|ERROR) (\S+)", run.stdout)
+        return "" if run.returncode in (0, 5) else failed[1] if failed else f"pytest ends with {run.returncode}"
+
+    def folder_of_compiled_code(self) -> Path:
+        """The folder in which the sources as they are now find their compiled code."""
+        ask = "from davinci_forces.maths.compiled import folder; print(folder())"
+        command = [sys.executable, "-c", ask]
+        answer = subprocess.run(
+            command, cwd=self.root, env=self.environment, capture_output=True, check=True, text=True
+        )
+        return Path(answer.stdout.strip())
+
+    def notices(self, mutant: Mutant) -> str:
+        """Return the test that fails with a mutant; "" if none does."""
+        file = self.root / mutant.file
+        whole = file.read_bytes()
+        try:
+            replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
+            if mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
+                shutil.copytree(self.compiled, self.folder_of_compiled_code(), dirs_exist_ok=True)
+            return self.failing_test(tests_for(mutant))
+        finally:
+            replace_source(file, whole)
+
+
+@cache
+def behind_compiled_code() -> frozenset[str]:
+    """The modules that compile functions, and all that they import: what compiled code depends on."""
+    files = [file for folder in SOURCES for file in (ROOT / PACKAGE / folder).rglob("*.py")]
+    files = [file for file in files if imports(file.read_text(), "davinci_forces.maths.compiled")]
+    return frozenset(code(*(dotted_name(file) for file in files)))
+
+
+def dotted_name(file: Path) -> str:
+    """The name by which a module is imported."""
+    name = file.relative_to(ROOT / "pipeline").with_suffix("").as_posix()
+    return name.removesuffix("/__init__").replace("/", ".")
 
 
 def replace_source(file: Path, code: bytes) -> None:
@@ -145,13 +203,9 @@ def main() -> None:
     asked = parser.parse_args()
     survivors = []
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder, "tree")
-        left_out = shutil.ignore_patterns(".git", ".venv", "processed", "reports", ".*_cache")
-        shutil.copytree(ROOT, tree, ignore=left_out)
-        for name in ("processed", "reports"):
-            (tree / name).mkdir()
+        tree = Tree(Path(folder))
         for number, mutant in enumerate(draw(asked.seed, asked.count), 1):
-            test = is_noticed(mutant, tree)
+            test = tree.notices(mutant)
             survivors += [] if test else [mutant]
             print(f"{number}. {mutant}: {test or 'SURVIVES'}", flush=True)
     print(f"{asked.count - len(survivors)} of {asked.count} mutants of seed {asked.seed} are noticed")

@@ -94,8 +94,8 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
     t, x = np.arange(samples) / 100, np.random.default_rng(3).normal(size=samples)
     beside = t + np.where(np.arange(samples) % 7 == 3, 1e-6, 0.0)  # s, of 0.01 s: more than a sample on a phase is off
     on, off = (averaging.Phases(times, 4.0, 400).fold(x) for times in (t, beside))
-    assert averaging.on_phases(t, 4.0, 400)
-    assert not averaging.on_phases(beside, 4.0, 400)
+    assert averaging.Phases(t, 4.0, 400).on_them == (samples >= 400)
+    assert not averaging.Phases(beside, 4.0, 400).on_them
     for name in averaging.Folded._fields:
         assert_allclose(getattr(on, name), getattr(off, name), atol=1e-3, err_msg=name)
     assert on.counts.sum() == samples
@@ -247,3 +247,13 @@ def test_times_with_a_gap_or_a_shift_are_not_even():
     t = np.arange(5000) / 100
     for late in (t + 1e-5 * (np.arange(5000) > 4000), t + 1e-8 * np.sin(t), np.delete(t, slice(700, 720)), t[:200]):
         assert harmonics.even_step(late) == 0.0
+
+
+@pytest.mark.parametrize(("errors", "excluded"), [(3.0, False), (5.0, True)])
+def test_data_exclude_a_stated_period_where_chance_would_in_none_of_a_thousand_studies(errors, excluded):
+    """Beyond three standard errors chance leads in one log of 370, beyond five in none of a million."""
+    estimate = period.Period(2.0, 1e-5)
+    used, remarks = average.reconcile_period(estimate, entry(period=2.0 + errors * 1e-5))
+    assert used.length == (2.0 if excluded else 2.0 + errors * 1e-5)
+    assert not remarks  # a period that is wrong by so little costs nothing
+    assert average.reconcile_period(estimate, entry(period=2.1))[1]

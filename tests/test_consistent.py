@@ -241,8 +241,8 @@ def smoothed(tau: np.ndarray) -> list[Motion]:
     t, segment = np.arange(N) / RATE, np.zeros(N, int)
     return [
         Motion(joint=joint.name, t=t, q=motion.q[:, i], dq=motion.dq[:, i], ddq=motion.ddq[:, i], tau=tau[:, i],
-               q_measured=motion.q[:, i], dq_measured=motion.dq[:, i], segment=segment, standing=np.zeros(N, int),
-               **about)
+               q_measured=motion.q[:, i], dq_measured=motion.dq[:, i], segment=segment, standing=segment,
+               filled=segment, **about)
         for i, joint in enumerate(ROBOT.joints[:3])
     ]  # fmt: skip
 

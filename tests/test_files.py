@@ -120,9 +120,7 @@ def test_a_log_that_is_a_pipe_costs_its_own_tasks_and_no_other(server):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-@pytest.mark.parametrize(
-    "name", ["recording/*/*.parquet", "tasks/ingest/*.json", "tasks/index.json", "results.json", "report.html"]
-)  # fmt: skip
+@pytest.mark.parametrize("name", ["recording/*/*.parquet", "tasks/ingest/*.json", "results.json", "report.html"])
 def test_verify_names_what_a_run_made_and_is_no_file_any_more(server, name, kind):
     file = next(f for f in server.files if Path(f).match(name))
     answer = server.ask(file, kind, "verify", "raw/arm")

@@ -61,9 +61,8 @@ def constant_velocity(speed: float) -> Signal:
     dq = speed * np.tanh(20.0 * np.sin(2 * np.pi * T / 5.0))
     q, ddq = np.cumsum(dq) / 200.0, np.gradient(dq, T)
     tau = regressor(arm.joint("hand_roll").terms, q, dq, ddq) @ arm.THETA["hand_roll"]
-    return Signal(
-        "run", "hand_roll", "friction", 200.0, "as recorded", "logged", 0, 0, T, q, dq, tau, np.zeros(len(T), int)
-    )
+    zero = np.zeros(len(T), int)
+    return Signal("run", "hand_roll", "friction", 200.0, "as recorded", "logged", 0, 0, T, q, dq, tau, zero, zero)
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.4])

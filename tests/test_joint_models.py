@@ -24,7 +24,7 @@ RATE, CUTOFF = 100.0, 17.0
 def resampled(role="identification", velocity="logged", gap=False) -> tuple[Signal, Motion]:
     signal = arm.signal(periods=2)
     kept = np.abs(signal.t - 12.0) > 1.0 if gap else np.ones(len(signal), bool)
-    columns = {name: getattr(signal, name)[kept] for name in ("t", "q", "dq", "tau")}
+    columns = {name: getattr(signal, name)[kept] for name in ("t", "q", "dq", "tau", "filled")}
     made = list(resample.run(Recording("run", "hand_roll", role, RATE, velocity, **columns), arm.joint("hand_roll"),
                              lowpass=CUTOFF))  # fmt: skip
     return tuple(next(record for record in made if isinstance(record, kind)) for kind in (Signal, Motion))

@@ -28,7 +28,7 @@ def recordings(scenario, log, run):
         unit = 1e-3 if log.current_unit == "mA" else 1.0
         q, dq = channels[f"{name}.theta_m"] / joint.gear_ratio, channels[f"{name}.dtheta_m"] / joint.gear_ratio
         tau = channels[f"{name}.i"] * unit * joint.gear_ratio * joint.torque_constant
-        columns = {"t": run.t, "q": q, "dq": dq, "tau": tau}
+        columns = {"t": run.t, "q": q, "dq": dq, "tau": tau, "filled": np.zeros(len(run.t), int)}
         columns = {symbol: x[recorded] for symbol, x in columns.items()}
         yield Recording(log.name, name, "identification", scenario.rate, "logged", **columns)
 

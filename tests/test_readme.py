@@ -50,7 +50,7 @@ from davinci_forces.runner import ALL
 from davinci_forces.runner.console import show_markdown
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration, stage_of
-from davinci_forces.study import AttachedMass, LogEntry, Settings, reading
+from davinci_forces.study import AttachedMass, LogEntry, Options, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES
 from tests.conftest import ROOT
@@ -136,7 +136,7 @@ def test_channels_are_those_that_there_are_with_the_units_taken():
 def test_formats_and_what_they_need_are_those_that_there_are():
     assert named(rows("format", "files")) == list(FORMATS)
     code = "".join(source.read_text(encoding="utf-8") for source in (PACKAGE / "logs").rglob("*.py"))
-    required = dict(re.findall(r'reader\("[\w.]+", "(\w+)", "(\w+)"\)', code))
+    required = dict(re.findall(r'package="(\w+)", extra="(\w+)"', code))
     table = rows("package", "licence")
     assert {spans(row[0])[0]: re.search(r"\[(\w+)\]", row[3])[1] for row in table} == required
     optional = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
@@ -158,7 +158,8 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     said = re.sub(r"```.*?```", "", pages, flags=re.S)
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
-    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(AttachedMass)} | {"file"} <= told
+    names = {f.name for kind in (LogEntry, Options, AttachedMass) for f in fields(kind)}
+    assert names - {"options"} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
     assert {"title", "robot", "simulated", "settings", "log", "tool", "length", "baseline"} | changeable <= told
     assert "[robot_overrides." in said

@@ -27,6 +27,7 @@ from davinci_forces.stages.model import fit, predict
 from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import LogEntry
 from tests import arm
+from tests.report.report_records import free_space
 
 RATE, LOWPASS = 100.0, 17.0
 JOINT = arm.joint("hand_roll")
@@ -51,7 +52,8 @@ def resting(stuck, push=0.0, role="contact", seed=3) -> Signal:
     parts = {name: np.concatenate([getattr(moving, name)[before], x, getattr(moving, name)[~before]])
              for name, x in columns.items()}  # fmt: skip
     times = np.arange(len(parts["q"])) / RATE
-    return replace(moving, t=times, segment=np.zeros(len(times), int), **parts)
+    zero = np.zeros(len(times), int)
+    return replace(moving, t=times, segment=zero, filled=zero, **parts)
 
 
 def entry(role) -> LogEntry:
@@ -90,7 +92,7 @@ def tracked(signal, identified):
 
 def pushed(stuck, push, identified):
     """The contacts of a resting joint that is pushed, and the threshold."""
-    space, _ = assess.run(tracked(resting(stuck, role="validation"), identified), entry("validation"))
+    space, _ = assess.run(tracked(resting(stuck, role="validation"), identified), entry("validation"), arm.ARM)
     thresholds = list(assess.gather([space]))
     track = tracked(resting(stuck, push), identified)
     made = list(measure.run(track, thresholds, entry("contact"), arm.ARM))
@@ -128,7 +130,7 @@ def test_friction_held_at_rest_moves_no_score_no_level_and_no_band(identified):
         signal = resting(stuck, role="validation")
         made = list(predict.run([arm.motion(signal)], fits, entry("validation"), arm.ARM, lowpass=LOWPASS))
         scores.append([r.relative_error for r in made if isinstance(r, Prediction)])
-        space, _ = assess.run(tracked(signal, identified), entry("validation"))
+        space, _ = assess.run(tracked(signal, identified), entry("validation"), arm.ARM)
         spaces.append([space.free_rms, space.coverage, space.detection_level, space.free_max])
     assert_allclose(*scores, rtol=2e-3)  # the low-pass carries a little of it beyond the samples left out
     assert_allclose(*spaces, rtol=1e-2)
@@ -189,9 +191,19 @@ def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(id
     reversals = signal.t[1:][np.diff(np.sign(arm.excitation("hand_roll", signal.t)[1])) != 0]
     gap = np.argmax(np.diff(reversals))
     once = (signal.t > reversals[gap] - 0.3) & (signal.t < reversals[gap + 1] - 0.3)
-    single = replace(harder, **{name: getattr(harder, name)[once] for name in ("t", "q", "dq", "tau", "segment")})
+    single = replace(
+        harder, **{name: getattr(harder, name)[once] for name in ("t", "q", "dq", "tau", "segment", "filled")}
+    )
     touched = replace(signal, tau=signal.tau + np.where((signal.t > 2.0) & (signal.t < 3.0), 1.0, 0.0))
     for log in (harder, single):
         assert not judged(log, identified[0])[1]
     assert not judged(replace(touched, role="contact"), identified[0], contact=((1.9, 3.1),))[1]
     assert judged(touched, identified[0])[1]  # nobody stated it: named
+
+
+def test_without_an_error_in_free_motion_there_is_no_alarm_level_and_no_error_of_one():
+    space = free_space(joint="hand_roll", tested=1000, quartile_coverage=np.ones(4), quartile_coverage_std=np.zeros(4))
+    [threshold] = assess.gather([space])
+    assert (threshold.alarm_level, threshold.alarm_level_std) == (0.0, 0.0)
+    [threshold] = assess.gather([replace(space, free_rms=0.1, free_rms_std=0.01, free_max=0.3, crossings=1.0)])
+    assert threshold.alarm_level_std / threshold.alarm_level == pytest.approx(0.1)

@@ -540,7 +540,8 @@ def remarked(damage, q_limits=(-0.6, 0.6)) -> str:
     signal = arm.signal("hand_roll", rate=100.0, periods=2)
     columns = {"t": signal.t, "q": signal.q.copy(), "dq": signal.dq.copy(), "tau": signal.tau.copy()}
     damage(columns)
-    recording = Recording("run", "hand_roll", "identification", 100.0, "logged", **columns)
+    filled = np.zeros(len(columns["t"]), int)
+    recording = Recording("run", "hand_roll", "identification", 100.0, "logged", **columns, filled=filled)
     made = resample.run(recording, arm.joint("hand_roll"), lowpass=17.0)
     return " ".join(text for record in made if isinstance(record, Diagnostic) for text in record.text)
 

@@ -231,10 +231,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
     assert re.search(r"^report: the code of records/prediction.py changed", said, re.M), said
 
 
-@pytest.mark.parametrize("whole", [True, False], ids=["index", "no index"])
-def test_entries_and_files_are_read_once_a_run_and_entries_only_where_no_index_holds_them(finished, monkeypatch, whole):
-    if not whole:
-        (processed(finished) / "tasks" / "index.json").unlink()
+def test_entries_and_files_are_read_once_a_run(finished, monkeypatch):
     hashed, read = Counter(), Counter()
     digest, entry = ledger.digest, ledger._read
     monkeypatch.setattr(ledger, "digest", lambda file: hashed.update([Path(file)]) or digest(file))
@@ -242,31 +239,17 @@ def test_entries_and_files_are_read_once_a_run_and_entries_only_where_no_index_h
     assert "nothing to do" in call("all", finished)
     assert set(processed(finished).rglob("*.parquet")) <= set(hashed)
     assert set(hashed.values()) == {1}
-    assert set(read) == (set() if whole else set((processed(finished) / "tasks").glob("*/*.json")))
-    assert set(read.values()) <= {1}
+    assert set(read) == set((processed(finished) / "tasks").glob("*/*.json"))
+    assert set(read.values()) == {1}
 
 
-def test_an_index_that_is_no_more_what_the_entries_say_is_not_believed(finished):
-    """An entry that somebody altered is read, and its task runs again; an index that was altered is made anew."""
-    tasks = processed(finished) / "tasks"
-    index, entry = tasks / "index.json", tasks / "average" / "roll.json"
-    good = index.read_bytes(), entry.read_bytes()
-    entry.write_bytes(good[1].replace(b'"failed": ""', b'"failed": "x"'))
+def test_an_entry_that_somebody_altered_counts_for_nothing(finished):
+    entry = processed(finished) / "tasks" / "average" / "roll.json"
+    good = entry.read_bytes()
+    entry.write_bytes(good.replace(b'"failed": ""', b'"failed": "x"'))
     assert "average: roll: it has not run yet" in call("average", finished)
-    index.write_bytes(good[0].replace(b"average", b"mistake"))
-    assert f"{index} does not agree with the entries beside it" in " ".join(call("verify", finished, code=1).split())
     assert "nothing to do" in call("all", finished)
-    assert (index.read_bytes(), entry.read_bytes()) == good
-
-
-def test_a_run_that_is_ended_leaves_no_index_that_lacks_what_it_made(finished, monkeypatch):
-    def end(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(ledger.Ledger, "write_index", end)
-    with pytest.raises(KeyboardInterrupt):
-        davinci_forces.run(finished, "average", force=True)
-    assert not (processed(finished) / "tasks" / "index.json").exists()
+    assert entry.read_bytes() == good
 
 
 def test_the_report_is_written_again_when_what_it_shows_or_it_itself_changed(finished):

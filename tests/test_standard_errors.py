@@ -28,7 +28,7 @@ def one(data) -> list[Average]:
     signals = []
     for i, joint in enumerate(JOINTS):
         columns = {"t": np.arange(N) / RATE, "q": table[:, i], "dq": table[:, 7 + i], "tau": table[:, 14 + i]}
-        columns["segment"] = np.zeros(N, int)
+        columns["segment"] = columns["filled"] = np.zeros(N, int)
         signals.append(Signal("one", joint, "identification", RATE, "as recorded", "logged", 0, 0, **columns))
     return [
         r for r in average.run(signals, entry(name="one"), ROBOT, harmonics=0, lowpass=17.0) if isinstance(r, Average)

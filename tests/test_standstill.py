@@ -96,7 +96,7 @@ def stopped(stuck: float):
     tau = regressor(arm.joint("hand_roll").terms, q, dq, ddq) @ arm.THETA["hand_roll"]
     return replace(
         signal, t=t, q=np.append(signal.q, q[-1] * more), dq=np.append(dq, 0.0 * more),
-        tau=np.append(tau, stuck * more) + noise, segment=np.zeros(len(t), int),
+        tau=np.append(tau, stuck * more) + noise, segment=np.zeros(len(t), int), filled=np.zeros(len(t), int),
     ), stop  # fmt: skip
 
 
@@ -131,7 +131,7 @@ def test_what_friction_holds_in_a_stop_moves_no_parameter_and_no_score(held):
 
 
 def resampled(signal, role="identification"):
-    columns = {name: getattr(signal, name) for name in ("t", "q", "dq", "tau")}
+    columns = {name: getattr(signal, name) for name in ("t", "q", "dq", "tau", "filled")}
     recording = Recording("run", "hand_roll", role, RATE, "logged", **columns)
     return list(resample.run(recording, arm.joint("hand_roll"), lowpass=LOWPASS))
 

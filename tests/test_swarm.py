@@ -16,7 +16,7 @@ from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
 from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, bodies, in_table_frames
+from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, in_table_frames
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
@@ -104,7 +104,7 @@ def test_physical_parameters_lump_as_the_chain_does(lc5):
     names = [x.name for x in joint.physical.parameters]
     x = np.array([x.guess for x in joint.physical.parameters])
     x[names.index("lc5")] = lc5
-    chain = reduced_parameters(CHAIN, bodies(lc5), 1, drives=DRIVES)
+    chain = reduced_parameters(CHAIN, in_table_frames(lc5).in_frames(CHAIN.of_links), 1, drives=DRIVES)
     found = dict(zip((term.name for term in joint.terms), known_of(joint).box.lumping.theta(x), strict=True))
     assert found["gravity, sine"] == pytest.approx(chain["gravity, sine"], abs=1e-12)
     assert found["gravity, cosine"] == pytest.approx(chain["gravity, cosine"], abs=1e-12)
@@ -131,3 +131,24 @@ def test_every_robot_has_a_fit_by_it_and_a_record_of_the_search():
     fits = {r.estimator: r for r in made if isinstance(r, Fit)}
     assert_allclose(fits["pso"].theta, fits["lse"].theta, atol=1e-3 * fits["lse"].theta_std_classical.min())
     assert [r.walls for r in made if isinstance(r, SwarmSearch)] == ["reflecting", "clipping"]
+
+
+def test_a_box_around_least_squares_holds_the_best_parameters_however_far_below_zero_those_are():
+    p = problem("instrument_slide", (2.5626, -3.0, 3.2723, 3.984), known=False)
+    box, best = pso.box_around(p.triangle, p), solve_bounded(p.triangle, p.known.positive)
+    assert p.triangle.theta[1] < -20 * np.ptp([box.lower[1], box.upper[1]]) / 100  # far beyond its error
+    assert np.all((box.lower <= best + 1e-9) & (best <= box.upper + 1e-9))
+    assert np.all(box.lower >= 0.0)
+
+
+def test_a_box_is_ten_standard_errors_wide_on_either_side_and_of_data_without_noise_no_wider_than_rounding():
+    p = problem("hand_roll", known=False)
+    R, box = p.triangle, pso.box_around(p.triangle, p)
+    free = Regression(p.Phi, p.tau, p.tau_var, p.periods, (0,), p.names)
+    wide = pso.box_around(R, free)
+    covariance = np.linalg.inv(p.Phi.T @ p.Phi * 10) * R.min_squares / (len(p.tau) - len(R.y))
+    assert_allclose(wide.upper - R.theta, pso.REACH * np.sqrt(np.diag(covariance)), rtol=1e-6)
+    assert np.all(box.lower >= 0.0)
+    exact = Regression(p.Phi, p.Phi @ R.theta, p.tau_var, p.periods, (0,), p.names)
+    assert np.ptp(exact.triangle.theta / R.theta) < 1e-9
+    assert np.all(np.abs(pso.box_around(exact.triangle, exact).upper / R.theta - 1.0) < 1e-6)

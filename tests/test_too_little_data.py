@@ -16,9 +16,8 @@ def recording(q, dq, seed=0, name="hand_roll") -> Signal:
     tau = arm.THETA[name][-2] * dq + arm.THETA[name][-1] * np.sign(dq) + 0.1 * np.sin(q)
     tau = tau + 0.05 * np.random.default_rng(seed).normal(size=len(q))
     t = np.arange(len(q)) / RATE
-    return Signal(
-        "run", name, "identification", RATE, "as recorded", "logged", 0, 0, t, q, dq, tau, np.zeros(len(q), int)
-    )
+    zero = np.zeros(len(q), int)
+    return Signal("run", name, "identification", RATE, "as recorded", "logged", 0, 0, t, q, dq, tau, zero, zero)
 
 
 def constant(samples: int) -> Signal:

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Regression
-from davinci_forces.estimators.tls import Noise, fit_for_noise
+from davinci_forces.estimators.tls import fit_for_noise
 from davinci_forces.identification.regression import averaged_motion, join_regressions, pose, row_covariance
 from davinci_forces.identification.scores import select_logs
 from davinci_forces.maths.estimation.least_squares import triangle
@@ -87,7 +87,7 @@ def test_with_noise_of_one_size_everywhere_it_is_the_textbook_s_smallest_singula
     rng = np.random.default_rng(0)
     Phi, tau = rng.normal(size=(60, 3)), rng.normal(size=60)
     R = triangle(Phi, tau, np.ones(60))
-    found = fit_for_noise(R, Noise(np.eye(3), 1.0 / R.scale**2), 1.0) / R.scale
+    found = fit_for_noise(R, np.eye(3), 1.0 / R.scale**2, 1.0) / R.scale
     *_, v = np.linalg.svd(np.column_stack([Phi, tau]))[2]
     assert_allclose(found, -v[:3] / v[3], rtol=1e-9)
 
@@ -97,8 +97,8 @@ def test_columns_without_noise_are_taken_out_first():
     rng = np.random.default_rng(1)
     Phi, tau = rng.normal(size=(60, 3)), rng.normal(size=60)
     R = triangle(Phi, tau, np.ones(60))
-    mixed = fit_for_noise(R, Noise(np.eye(3), np.array([0.0, 0.0, 1.0])), 1.0)
-    limit = fit_for_noise(R, Noise(np.eye(3), np.array([1e-10, 1e-10, 1.0])), 1.0)
+    mixed = fit_for_noise(R, np.eye(3), np.array([0.0, 0.0, 1.0]), 1.0)
+    limit = fit_for_noise(R, np.eye(3), np.array([1e-10, 1e-10, 1.0]), 1.0)
     assert_allclose(mixed, limit, rtol=1e-6)
     assert np.abs(mixed - R.theta * R.scale).max() > 0.01
 
@@ -113,8 +113,8 @@ def test_a_model_that_errs_beyond_noise_is_not_taken_for_noise_of_the_columns():
     assert_allclose(tls, expected, rtol=1e-6)
     R = triangle(Phi, wrong.tau, np.ones(K))
     variance, axes = np.linalg.eigh(C / np.outer(R.scale, R.scale))
-    noise = Noise(axes, np.where(variance > 1e-12 * variance[-1], variance, 0.0))
-    textbook = fit_for_noise(R, noise, float(wrong.tau_var.sum())) / R.scale
+    variance = np.where(variance > 1e-12 * variance[-1], variance, 0.0)
+    textbook = fit_for_noise(R, axes, variance, float(wrong.tau_var.sum())) / R.scale
     assert abs(textbook[0] - lse[0]) > 10 * abs(tls[0] - lse[0])
 
 

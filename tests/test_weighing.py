@@ -147,7 +147,7 @@ def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T, false=0.0):
     segment = np.zeros(len(t), int)
     motions = [
         arm.motion(Signal(name, joint, role, RATE, "as recorded", "logged", 0, 0, t=t, q=q[:, i], dq=dq[:, i],
-                          tau=tau[:, i], segment=segment)) for i, joint in enumerate(JOINTS)
+                          tau=tau[:, i], segment=segment, filled=segment)) for i, joint in enumerate(JOINTS)
     ]  # fmt: skip
     return [described(one) for one in motions], motions
 

@@ -54,16 +54,15 @@ class CommandLine(TyperGroup):
 
 
 def copy_command(command: TyperCommand, name: str, module: str, panel: str) -> TyperCommand:
-    """Copy a command into a panel under another name; its help is the docstring of a module."""
-    copied = copy(command)
-    copied.name, copied.help, copied.rich_help_panel = name, escape_tags(read_docstring(module)), panel
-    return copied
+    """Copy a command into a panel under another name; its help is the docstring of a module.
 
-
-def read_docstring(module: str) -> str:
-    """Read the docstring of a module from its file, since importing all modules would take seconds."""
+    The docstring is read from the module's file, since importing all modules would take seconds.
+    """
     file = Path(__file__).parent.joinpath(*module.split(".")[1:]).with_suffix(".py")
-    return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
+    docstring = cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
+    copied = copy(command)
+    copied.name, copied.help, copied.rich_help_panel = name, escape_tags(docstring), panel
+    return copied
 
 
 def escape_tags(text: str) -> str:
@@ -210,13 +209,7 @@ def options(version: Version = False) -> None:
 
 
 def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
-    """Return the verbosity of a run.
-
-    Raises
-    ------
-    typer.BadParameter
-        If both options are set.
-    """
+    """Return the verbosity of a run; raises typer.BadParameter if both options are set."""
     if quiet and verbose:
         raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")
     return "quiet" if quiet else "verbose" if verbose else "normal"

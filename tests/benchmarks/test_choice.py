@@ -31,7 +31,13 @@ def smoothed() -> list[Motion]:
         for i, joint in enumerate(ROBOT.joints):
             zero = np.zeros(SAMPLES, int)
             columns = {"t": t, "q": q[:, i], "dq": dq[:, i], "ddq": ddq[:, i], "tau": tau[:, i]}
-            columns |= {"q_measured": q[:, i], "dq_measured": dq[:, i], "segment": zero, "standing": zero}
+            columns |= {
+                "q_measured": q[:, i],
+                "dq_measured": dq[:, i],
+                "segment": zero,
+                "standing": zero,
+                "filled": zero,
+            }
             about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
             records.append(Motion(f"run{number}", joint.name, *about, **columns))
     return records

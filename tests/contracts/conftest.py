@@ -1,6 +1,9 @@
-"""A small study, analysed once: records of every kind, for the contracts of stages and sections."""
+"""Small studies, analysed once: one with records of every kind, for the contracts of stages and sections, and one with
+the faults of a laboratory.
+"""
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,6 +28,7 @@ from davinci_forces.stages import STAGES, design
 from davinci_forces.study import Study, reading
 from tests import arm
 from tests.conftest import once
+from tests.contracts import faulty
 
 TRUTH = {
     "theta": {name: dict(zip((t.name for t in arm.joint(name).terms), theta.tolist(), strict=True))
@@ -87,15 +91,35 @@ def lab(tmp_path_factory) -> Lab:
     """The study, which is analysed once a run of the tests; each process has a copy."""
     home = tmp_path_factory.mktemp("lab") / "home"
     shutil.copytree(once(tmp_path_factory, "contracts", analyse), home)
-    folder = home / "raw" / "arm"
-    study = study_in(folder)
-    its_folders = folders(folder, None, None)
+    return lab_of(study_in(home / "raw" / "arm"))
+
+
+@pytest.fixture(scope="session")
+def faulty_lab(tmp_path_factory) -> Lab:
+    """The study with the faults of a laboratory, which is analysed once a run of the tests."""
+    return lab_of(faulty_study_in(once(tmp_path_factory, "faulty", analyse_faulty) / "raw" / "faulty"))
+
+
+def lab_of(study: Study) -> Lab:
+    """A study with its folders."""
+    its_folders = folders(study.folder, None, None)
     return Lab(study, its_folders, Plan(study, Ledger(its_folders)))
 
 
 def study_in(folder: Path) -> Study:
     """The study of a folder with the robot of these tests, and with its ground truth."""
     return replace(reading.read(folder), robot=robot(), truth=TRUTH)
+
+
+def faulty_study_in(folder: Path) -> Study:
+    """The faulty study of a folder, with a robot that has a geometry and no controller, and with its ground truth."""
+    return replace(reading.read(folder), robot=replace(robot(), control=()), truth=faulty.TRUTH)
+
+
+def analyse_faulty(home: Path) -> None:
+    """Write the faulty study, and run the stages that depend on its logs."""
+    study = faulty_study_in(faulty.write_study(home / "raw" / "faulty"))
+    run(study, [stage for stage in STAGES if stage not in ("design", "haptic-limits")])
 
 
 def analyse(home: Path) -> None:
@@ -114,11 +138,15 @@ def analyse(home: Path) -> None:
         file.write(arm.log_table("pitch", "pitch.csv", "identification", ["hand_pitch"]))
         file.write(arm.log_table("tip", "tip.csv", "contact", ALL, "contact = [[4.0, 8.0]]"))
         file.write("".join(f'{name} = "{name}"\n' for name in sensed()))
-    said: list[str] = []
-    runner = Runner(study_in(folder), folders(folder, None, None), Console(lambda line: None, said.append))
     with pytest.MonkeyPatch.context() as shorter:
         shorten(shorter)
-        good = runner.run(STAGES)
+        run(study_in(folder), STAGES)
+
+
+def run(study: Study, stages: Sequence[str]) -> None:
+    """Run stages, none of which may fail."""
+    said: list[str] = []
+    good = Runner(study, folders(study.folder, None, None), Console(lambda line: None, said.append)).run(stages)
     assert good, "\n".join(said)
 
 
@@ -137,5 +165,16 @@ def series(period: float) -> Fourier:
 @pytest.fixture(scope="session")
 def catalogue(lab: Lab) -> Catalogue:
     """Every record of the study, read already."""
+    return catalogue_of(lab)
+
+
+@pytest.fixture(scope="session")
+def faulty_catalogue(faulty_lab: Lab) -> Catalogue:
+    """Every record of the faulty study, read already."""
+    return catalogue_of(faulty_lab)
+
+
+def catalogue_of(lab: Lab) -> Catalogue:
+    """Every record of a study, read already."""
     records = {kind: lab.records(kind) for kind in KINDS.values()}
     return Catalogue(records.__getitem__)

@@ -11,6 +11,7 @@ import pytest
 from davinci_forces.records import (
     KINDS,
     Average,
+    Comparison,
     Contact,
     Diagnostic,
     Fit,
@@ -24,7 +25,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.record import diagnostic
-from davinci_forces.report.changes import StatedValue
+from davinci_forces.report.changes import Change, StatedValue
 from davinci_forces.report.content import (
     Bullets,
     Document,
@@ -33,6 +34,7 @@ from davinci_forces.report.content import (
     Figure3D,
     Listing,
     Number,
+    OnScreen,
     Prose,
     Section,
     Table,
@@ -46,6 +48,7 @@ from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (
     DOCUMENTS,
     SECTIONS,
+    filters,
     ground_truth,
     joints,
     noise,
@@ -54,6 +57,9 @@ from davinci_forces.report.sections import (
     summary,
     tissue,
 )
+from davinci_forces.report.sections import (
+    baseline as baseline_section,
+)
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study.review import Rating
@@ -61,7 +67,9 @@ from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
-PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
+HASHES = {"0" * 64: "raw/arm/roll.csv", "1" * 64: f"{Fit.folder()}/independent/hand_roll.parquet"}
+RAW, PROCESSED = ({place: sha} for sha, place in HASHES.items())
+PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, RAW, PROCESSED, {"fit": "no joint moves"})
 
 
 RATINGS = (
@@ -72,7 +80,8 @@ RATINGS = (
 
 def context(lab: Lab, catalogue: Catalogue) -> Context:
     results = collect(catalogue)
-    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, baseline=baseline(results))
+    labels = frozenset({"answer-figure"})
+    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, labels, baseline(results))
 
 
 def baseline(results: Results) -> dict[str, StatedValue]:
@@ -327,3 +336,62 @@ def test_a_period_that_is_noisier_than_the_others_is_named(lab: Lab, catalogue: 
     [verdict] = noise.outliers(about, average)
     which = f"effort noise of period {period} of {average.periods} is 8.0 times that of the median period."
     assert verdict.text.endswith(f"{which}{advice}")
+
+
+def test_new_keys_beyond_those_listed_are_counted(full: Context):
+    keys = [f"new.{i}" for i in range(baseline_section.MAX_ROWS + 7)]
+    differences = [Change(key, None, StatedValue(1.0)) for key in keys]
+    [block] = [b for b in baseline_section.blocks(full, {}, differences) if isinstance(b, OnScreen)]
+    [listing] = block.blocks
+    *shown, last = listing.text.splitlines()
+    assert shown == keys[: len(shown)]
+    assert last == f"and {len(keys) - len(shown)} more"
+
+
+def test_measurements_beyond_those_on_page_one_are_counted(full: Context):
+    [measured, *_] = full.catalogue.records(Stiffness)
+    weights, many = full.catalogue.records(Weight), [measured] * (opening.MAX_MEASURED + 3)
+    catalogue = Catalogue(lambda kind: many if kind is Stiffness else full.catalogue.records(kind))
+    *shown, last = opening.measurements(replace(full, catalogue=catalogue))
+    assert last.startswith(f"{len(weights) + len(many) - len(shown)} more logs")
+
+
+def test_details_of_a_joint_are_those_of_least_squares_in_whichever_order_its_fits_are(full: Context):
+    fits = [fit for fit in full.own_fits() if fit.group == "hand_roll"]
+    [(_, *one), (_, *other)] = (joints.comparison(full, order).blocks for order in (fits, fits[::-1]))
+    assert one
+    assert [*map(repr, one)] == [*map(repr, other)]
+
+
+def test_the_middle_of_a_log_is_drawn_of_filters_that_are_compared(full: Context):
+    [compared, *_] = full.catalogue.records(Comparison)
+    t = 100.0 + np.arange(3000) / 50.0
+    long = replace(compared, filter="direct", t=t, tau_ext=np.sin(t))
+    [line] = filters.panel([long], True).marks
+    assert (line.x[0] + line.x[-1]) / 2 == pytest.approx(t.mean(), abs=0.02)
+    assert line.x[-1] - line.x[0] == pytest.approx(filters.SECONDS_DRAWN, abs=0.04)
+
+
+def test_a_joint_tested_on_its_own_path_comes_between_errors_of_a_third_and_of_a_half(full: Context):
+    """Its true error is not known: it may be worse than an error of a third, and an error of a half is worse."""
+    [same] = trusts(full, hand_pitch=0.05)
+    same = replace(same, prediction=replace(same.prediction, path="same path"), about=None)
+    for share, first in ((0.33, "tested only on the path"), (0.55, "the model error is")):
+        [other] = trusts(full, hand_roll=share)
+        other = replace(other, prediction=replace(other.prediction, role="identification"))
+        looks = sorted(summary.looks_at(full, [other, same]), key=lambda look: -look[0])
+        texts = [text for _, text in looks if "model error is" in text or "tested only" in text]
+        assert first in texts[0]
+
+
+@pytest.mark.parametrize(("seconds", "hidden"), [(1.0, 0.1), (20.0, 0.25)])
+def test_what_a_filter_says_before_it_has_converged_is_not_what_an_effort_reaches(full: Context, seconds, hidden):
+    """A quarter of a second, of a short log a tenth."""
+    track, rate = full.catalogue.records(Track)[0], 100.0
+    t = np.arange(round(seconds * rate)) / rate
+    columns = dict.fromkeys(Track.columns(), np.ones(len(t))) | {"t": t}
+    for at, reached in ((round(hidden * rate) - 1, False), (round(hidden * rate), True)):
+        effort = np.ones(len(t))
+        effort[at] = 50.0
+        figure = runs.trace(full, replace(track, rate=rate, **columns | {"tau_ext_smooth": effort}), "")
+        assert ("reaches 50" in figure.alt) == reached

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from davinci_forces.maths.models.memory import efforts
 from davinci_forces.records import Choice, Contact, FilterNoise, Fit, JointModel, Motion, Track
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.stages.forces import stream as stage
+from tests import arm
 from tests.exported import ORIGIN, export, motion, motion_of
 
 T_S = 0.01
@@ -198,3 +200,11 @@ def test_joints_of_several_rates_or_without_a_filter_are_refused(small):
     document["joints"][0]["filter"] |= {"rate": 77.0}
     with pytest.raises(ValueError, match="need filters of one rate"):
         Stream(document)
+
+
+def test_a_motion_that_is_later_than_the_effort_by_its_lag_needs_that_much_less_of_a_delay():
+    recorded = arm.motion(arm.signal(periods=1, noise=0.0))
+    late, plain = (stage._motion(replace(recorded, effort_lag=by), 17.0, lag) for by, lag in ((0.03, 0.1), (0.0, 0.07)))
+    for name in ("q", "dq", "ddq"):
+        assert_allclose(getattr(late, name), getattr(plain, name), atol=1e-12)
+    assert np.abs(stage._motion(recorded, 17.0, 0.1).ddq - plain.ddq).max() > 1e-9

@@ -52,7 +52,7 @@ def open_in_child(path, options):
 
 def start(tmp_path, what: str) -> Log:
     (tmp_path / "log.odd").write_text(what)
-    return isolated.start(tmp_path / "log.odd", Options(), HERE)
+    return isolated.read(tmp_path / "log.odd", Options(), HERE)
 
 
 def test_blocks_and_remarks_are_those_of_the_child(tmp_path):
@@ -106,7 +106,7 @@ def test_a_refusal_names_the_file_as_it_was_named(tmp_path, monkeypatch):
     (tmp_path / "log.odd").write_text("refuse")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BadLog) as raised:
-        isolated.start(Path("log.odd"), Options(), HERE)
+        isolated.read(Path("log.odd"), Options(), HERE)
     assert str(raised.value) == "log.odd: refused"
 
 
@@ -133,7 +133,7 @@ def test_a_child_ends_with_its_parent(tmp_path):
 
     code = (
         "from pathlib import Path\n"
-        "from davinci_forces.logs.isolated import start\n"
+        "from davinci_forces.logs.isolated import read as start\n"
         "from davinci_forces.logs.log import Options\n"
         f"print(start(Path({str(tmp_path / 'log.odd')!r}), Options(), {HERE!r}).facts['pid'], flush=True)\n"
         "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"

@@ -102,7 +102,7 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     columns = zip(("one", "two"), motion.q.T, motion.dq.T, motion.ddq.T, tau.T, strict=True)
     about = ("identification", 1 / T_S, "logged", 4.0, 0.0, 0, 0.0, 0.0, 0.0)
     records = [
-        Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still)
+        Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still, still)
         for name, q, dq, ddq, own in columns
     ]
     log = observe(records, (), 4.0, 0)

@@ -40,7 +40,8 @@ def motion(added=(), noise=0.0, lag=0.0, seed=0) -> Motion:
     tau = effort(t - lag) + 0.02 * random.normal(size=len(t))
     zero = np.zeros(len(t), np.int64)
     about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
-    return Motion("run", ROLL.name, *about, t, *smooth, np.gradient(smooth[1], 1 / RATE), *measured, tau, zero, zero)
+    ddq = np.gradient(smooth[1], 1 / RATE)
+    return Motion("run", ROLL.name, *about, t, *smooth, ddq, *measured, tau, zero, zero, zero)
 
 
 def search(record: Motion, joint=ROLL):
@@ -93,8 +94,8 @@ def test_a_sliding_joint_has_no_harmonics_and_one_with_an_offset_gets_no_second(
 
 
 def test_neighbours_of_a_value_lie_on_both_sides():
-    assert neighbours(CUTOFF_GRID, 17.0, 1) == (14.0, 17.0, 20.0)
-    assert neighbours(CUTOFF_GRID, 5.0, 1) == (5.0, 6.0)
+    assert neighbours(CUTOFF_GRID, 17.0) == (14.0, 17.0, 20.0)
+    assert neighbours(CUTOFF_GRID, 5.0) == (5.0, 6.0)
 
 
 def test_a_model_is_rebuilt_from_the_names_and_scales_of_its_parameters():

@@ -82,7 +82,7 @@ def still() -> Figure:
             Panel("", "x", "n", (Histogram([0, 1, 2], [3, 4], "counts"), VLine(1.5), VSpan(0, 1), Band(x, x, x + 1))),
             Panel("Log", "x", "y", (Points(x, x, y_std=0.1), Reference(1), HBand(0.1, 0.2), Stems(x, x)), x_log=True),
             Panel("", "", "", (Tiles([1.0, -0.5, -0.5, 1.0], ("θ1 $a$", "θ2 b")),)),
-            Panel("", "", "θ", (Bars(("a", "b"), [1, 2], "LSE", std=[0.1, 0.1]), Bars(("a", "b"), [2, 3], "WLSE"))),
+            Panel("", "", "θ", (Bars(("a", "b"), [1, 2], "LSE"), Bars(("a", "b"), [2, 3], "WLSE"))),
         ),
         label="still",
         columns=2,

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.records import FreeSpace, Prediction, Stiffness, Weight
+from davinci_forces.records.catalogue import AnyRecord
 
 NOTHING = np.zeros(0)
 
@@ -39,3 +40,10 @@ def stiffness(contacts: int, **scores: Any) -> Stiffness:
     columns = dict.fromkeys(Stiffness.columns(), np.zeros(contacts))
     about = {"log": "run", "source": "force sensor"}
     return Stiffness(**(dict.fromkeys(Stiffness.scalars(), 0.0) | columns | about | scores))
+
+
+def record(kind: type[AnyRecord], length: int, **values: Any) -> AnyRecord:
+    """A record of any kind: columns of a length, and nothing in them but the values given."""
+    scalars = {name: kind.__annotations__.get(name, "str") for name in kind.scalars()}
+    empty = {name: "" if declared in ("str", str) else 0.0 for name, declared in scalars.items()}
+    return kind(**(empty | dict.fromkeys(kind.columns(), np.zeros(length)) | values))

@@ -143,3 +143,17 @@ def test_another_tool_moves_the_tip_along_its_axis_and_nothing_else(length: floa
 def test_a_robot_whose_tool_is_not_known_takes_no_other():
     with pytest.raises(BadRobot, match="robot davinci has no known tool in its chain"):
         ARMS["davinci"].with_tool(0.4)
+
+
+@pytest.mark.parametrize("q_pitch", [-0.4, 0.3, 0.9])  # at 0 it touches zero without a change of sign
+def test_the_jacobian_is_singular_at_the_slides_that_are_said_to_be_and_nowhere_between(q_pitch: float):
+    slides = tip_force.singular_slides(DAVINCI, q_pitch)
+    assert np.all(np.diff(slides) >= 0)
+
+    def det(slide: float) -> float:
+        return float(np.linalg.det(kinematics.jacobian(DAVINCI, np.array([0.2, q_pitch, slide]))[0]))
+
+    size = max(abs(det(-1.0)), abs(det(1.0)))
+    assert max(abs(det(slide)) for slide in slides) < 1e-9 * size
+    signs = np.sign([det(slide) for slide in np.linspace(-1.0, 1.0, 401)])
+    assert np.count_nonzero(np.diff(signs)) == np.count_nonzero(np.abs(slides) < 1.0)

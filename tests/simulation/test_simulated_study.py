@@ -123,7 +123,7 @@ def test_every_unbiased_estimator_finds_the_truth_of_averaged_periods_within_its
     q, t = columns[f"{joint}.theta_m"] / it.gear_ratio, np.arange(len(tau)) / 100.0
     log, segment = f"{name}-excitation", np.zeros(len(t), int)
     signal = Signal(log, joint, "identification", 100.0, "as recorded", "differences", 0, 0, t=t, q=q,
-                    dq=np.gradient(q, 0.01), tau=tau, segment=segment)  # fmt: skip
+                    dq=np.gradient(q, 0.01), tau=tau, segment=segment, filled=segment)  # fmt: skip
     entry = study.log(log)
     (average_of,) = [
         r for r in average.run([signal], entry, study.robot, harmonics=0, lowpass=17.0) if isinstance(r, Average)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from davinci_forces.runner.console import echo
+from davinci_forces.runner.console import echo, table
 
 if TYPE_CHECKING:
     from davinci_forces.report.changes import Change, StatedValue
@@ -74,7 +74,8 @@ def _lines(
     for joint, group in by_joint(changed, [*before, *after]).items():
         largest = sorted(group[:most], key=lambda change: ORDER.index(change.subject))
         lines += ["", f"{joint or 'not of one joint'}: {len(group)} changed"]
-        lines += _table([("", "key", "a", "b", "std", "z"), *map(_cells, largest)])
+        rows = [("", "key", "a", "b", "std", "z"), *map(_cells, largest)]
+        lines += [f"  {line}" for line in table(rows, right_from=2)]
         rest = Counter(change.subject for change in group[most:])
         lines += [f"  and {', '.join(f'{rest[m]} of {m}' for m in ORDER if rest[m])}: --all lists them"] if rest else []
     if changed:
@@ -107,15 +108,3 @@ def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
         if texts[0] != texts[1]:
             break
     return f"{texts[0]} {format_unit(a.unit)}".rstrip(), f"{texts[1]} {format_unit(b.unit)}".rstrip()
-
-
-def _table(rows: list[tuple[str, ...]]) -> list[str]:
-    """Rows of a table, the first two columns aligned left and the others right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  "
-        + "  ".join(
-            c.rjust(w) if i > 1 else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]

@@ -11,7 +11,7 @@ import typer
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
-    from davinci_forces.maths.excitation.search import ReportStart
+    from davinci_forces.maths.excitation.arm import ReportStart
     from davinci_forces.simulation.excitation.request import Answer, ArmExcitation
     from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory, ExpectedParameter
 

@@ -1,6 +1,7 @@
 """Simulate haptic feedback through arm, controller and filter from a scenario: felt forces and stability margins."""
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,13 +39,7 @@ def run(
 
 
 def _write_template(file: Path) -> None:
-    """Write the shipped scenario to a new file.
-
-    Raises
-    ------
-    BadRequest
-        If the file exists.
-    """
+    """Write the shipped scenario to a new file; raises BadRequest if the file exists."""
     from importlib.resources import files
 
     from davinci_forces.errors import BadRequest
@@ -67,20 +62,16 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
         run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, name, hand, loop)
         if csv is not None:
             _write_csv(csv / f"{name}.csv", run)
-        numbers = [key for key in found.scalars() if not key.startswith(("hand", "link"))]
+        numbers = {key: getattr(found, key) for key in found.scalars() if not key.startswith(("hand", "link"))}
         hands[name] = {
             "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": float(run.true.max()),
             "felt_peak": float(run.felt.max()), "felt_error": run.error,
             "out_of_reach": float(run.t[-1]) if run.thrown else None,
-            **{key: _known(getattr(found, key)) for key in numbers},
+            **{key: None if math.isnan(value) else value for key, value in numbers.items()},
         }  # fmt: skip
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}
-
-
-def _known(value: float) -> float | None:
-    return value if value == value else None
 
 
 def _write_csv(file: Path, run: object) -> None:

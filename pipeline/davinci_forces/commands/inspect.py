@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from davinci_forces.runner.console import echo
+from davinci_forces.runner.console import echo, table
 
 if TYPE_CHECKING:
     from davinci_forces.logs.log import Log, Options
@@ -176,12 +176,13 @@ def lines(description: dict[str, Any]) -> Iterator[str]:
         channels = ", ".join(map(repr, extra["channels"][:6])) + (" ..." if len(extra["channels"]) > 6 else "")
         yield f"another clock: {extra['source']}, {extra['rate']:.6g} Hz, of {channels}"
     yield "channels:"
-    yield from _table([_row(i, channel) for i, channel in enumerate(description["channels"])])
+    rows = [_row(i, channel) for i, channel in enumerate(description["channels"])]
+    yield from (f"  {line}" for line in table(rows))
     if any(description["head"].values()):
         yield "first rows:"
         names = list(description["head"])
-        rows = zip_longest(*description["head"].values())
-        yield from _table([names, *([_number(value) for value in row] for row in rows)])
+        head = [[_number(value) for value in row] for row in zip_longest(*description["head"].values())]
+        yield from (f"  {line}" for line in table([names, *head]))
     for title in ("comments", "warnings"):
         if description[title]:
             yield f"{title}:"
@@ -199,12 +200,6 @@ def _row(number: int, channel: dict[str, Any]) -> list[str]:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.9g}" if abs(value) >= 1e5 else f"{value:.6g}"
-
-
-def _table(rows: list[list[str]]) -> Iterator[str]:
-    widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(max(map(len, rows), default=0))]
-    for row in rows:
-        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
 
 
 def sparkline(course: list[float | None]) -> str:

@@ -1,15 +1,11 @@
 """Write a commented study.toml for logs, with a guess of what their channels measure."""
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from davinci_forces.runner.console import echo
-
-if TYPE_CHECKING:
-    from davinci_forces.study.template import Row
+from davinci_forces.runner.console import echo, table
 
 
 def run(
@@ -38,13 +34,5 @@ def run(
         write_bytes(folder / draft.robot_file, draft.robot_text.encode())
         echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
     write_bytes(target, draft.text.encode())
-    echo("\n".join(_table(draft.rows)))
+    echo("\n".join(table([("file", "role", "rate", "joints", "look at"), *draft.rows])))
     echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")
-
-
-def _table(rows: "Sequence[Row]") -> Iterator[str]:
-    """The logs as lines of a table; the reasons, which may be long, last."""
-    titles = ("file", "role", "rate", "joints", "look at")
-    widths = [max(len(row[i]) for row in (titles, *rows)) for i in range(len(titles) - 1)]
-    for row in (titles, *rows):
-        yield "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[-1]]).rstrip()

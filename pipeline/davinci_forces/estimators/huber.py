@@ -1,7 +1,6 @@
 """Robust least squares: samples far from the fit have a bounded influence.  (Huber, 1964)"""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,14 +15,6 @@ MAX_STEPS_HUBER = 200
 TOLERANCE_HUBER = 1e-12  # change of the fitted effort at which the iteration stops, as a share of the effort
 
 
-class RobustFit(NamedTuple):
-    """Parameters, and the residuals over their standard deviation."""
-
-    theta: Array  # (p,)
-    off: Array  # (K,)
-    deviation: float
-
-
 def estimate(problem: Regression) -> Estimate:
     """theta with sum of psi(r_k / s) Phi_k = 0, psi(u) = u up to `HUBER_K`, constant beyond; weighted least squares.
 
@@ -34,12 +25,24 @@ def estimate(problem: Regression) -> Estimate:
     and takes eight times as long for 600 000 rows.
     """
     weight, R = problem.weight, problem.triangle
-    fit = fit_robustly(problem, weight, R)
-    return Estimate(fit.theta, lambda: robust_standard_errors(problem, weight, R, fit))
+    theta, off, deviation = fit_robustly(problem, weight, R)
+
+    def robust_standard_errors() -> StandardErrors:
+        """Compute the standard errors from pseudo-residuals."""
+        is_inside = np.abs(off) < HUBER_K
+        share_inside = float(np.mean(is_inside[weight > 0]))
+        pseudo = deviation * np.clip(off, -HUBER_K, HUBER_K) / share_inside
+        noise = None if problem.noise is None else problem.noise * is_inside / share_inside
+        return standard_errors(replace(problem, noise=noise), weight, R, theta, pseudo)
+
+    return Estimate(theta, robust_standard_errors)
 
 
-def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
-    """Repeat weighted least squares until the fitted effort changes less than `TOLERANCE_HUBER`."""
+def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> tuple[Array, Array, float]:
+    """Repeat weighted least squares until the fitted effort changes less than `TOLERANCE_HUBER`.
+
+    Returns the parameters (p,), and the residuals (K,) in standard deviations and that deviation.
+    """
     theta, root = R.theta, np.sqrt(weight)
     tolerance = TOLERANCE_HUBER * np.sqrt(float(R.y @ R.y) + R.min_squares)
     for _ in range(MAX_STEPS_HUBER):
@@ -51,14 +54,4 @@ def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
         change = R.U @ ((theta - before) * R.scale)
         if change @ change <= tolerance**2:
             break
-    return RobustFit(theta, off, deviation)
-
-
-def robust_standard_errors(problem: Regression, weight: Array, R: Triangle, fit: RobustFit) -> StandardErrors:
-    """Compute the standard errors from pseudo-residuals."""
-    is_inside = np.abs(fit.off) < HUBER_K
-    share_inside = float(np.mean(is_inside[weight > 0]))
-    pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / share_inside
-    if problem.noise is not None:
-        problem = replace(problem, noise=problem.noise * is_inside / share_inside)
-    return standard_errors(problem, weight, R, fit.theta, pseudo)
+    return theta, off, deviation

@@ -9,7 +9,6 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import MAX_CONDITION, MIN_PART_NAMED, Estimate, Regression, standard_errors_by
-from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import dependent_parameters
 
 NAME = "instrumental variables"
@@ -27,7 +26,9 @@ def estimate(problem: Regression) -> Estimate:
     weight, R = problem.weight, problem.triangle
     root = np.sqrt(weight)[:, None]
     F = problem.Phi * root / R.scale
-    Q, _ = np.linalg.qr(instruments(problem) * root / R.scale)
+    parts = np.split(problem.Phi, problem.starts[1:])
+    Z = np.concatenate([np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0) for part in parts])
+    Q, _ = np.linalg.qr(Z * root / R.scale)  # the scale of the instruments has no effect
     ZF = Q.T @ F
     if (condition := np.linalg.cond(ZF)) > MAX_CONDITION:
         alike = ", ".join(problem.names[i] for i in dependent_parameters(ZF, MIN_PART_NAMED))
@@ -35,9 +36,3 @@ def estimate(problem: Regression) -> Estimate:
         raise NotIdentifiable(f"{motion} does not separate {alike}: condition number {condition:.1e}")
     theta = np.linalg.solve(ZF, Q.T @ (problem.tau * root[:, 0])) / R.scale
     return Estimate(theta, lambda: standard_errors_by(problem, weight, theta, Q, np.linalg.inv(ZF) / R.scale[:, None]))
-
-
-def instruments(problem: Regression) -> Array:
-    """Return Z (K, p), the sum of the regressors `LAG` samples before and after; their scale has no effect."""
-    parts = np.split(problem.Phi, problem.starts[1:])
-    return np.concatenate([np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0) for part in parts])

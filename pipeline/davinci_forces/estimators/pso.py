@@ -9,7 +9,7 @@ import numpy as np
 from davinci_forces.estimators.problem import Estimate, Regression, Search, standard_errors
 from davinci_forces.maths.estimation.least_squares import Triangle, solve_bounded
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, PARTICLES, THESIS, Manner, search
-from davinci_forces.maths.models.physical import Box, each_for_itself
+from davinci_forces.maths.models.physical import Box, Lumping
 
 NAME = "particle swarm"
 SEED = 0
@@ -39,9 +39,9 @@ def box_around(R: Triangle, problem: Regression) -> Box:
     std = np.maximum(std, np.finfo(float).eps * np.abs(theta))  # data without noise have no error
     missing = np.max(-theta[positive] / std[positive], initial=0.0)
     reach = (REACH + missing) * std
-    lower, upper = theta - reach, theta + reach
     bound = np.where(positive, 0.0, -np.inf)
-    return Box(np.maximum(lower, bound), np.maximum(upper, bound), each_for_itself(p))
+    themselves = Lumping(np.column_stack([np.arange(p), np.full((p, 2), p)]), np.eye(p))  # theta = x
+    return Box(np.maximum(theta - reach, bound), np.maximum(theta + reach, bound), themselves)
 
 
 def run_search(R: Triangle, box: Box, problem: Regression, manner: Manner) -> Search:

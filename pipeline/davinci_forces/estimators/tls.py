@@ -8,8 +8,6 @@ analysis of the total least squares problem, 1980; Van Huffel and Vandewalle, Th
 section 3.5 (generalised: mixed, and correlated noise).
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.linalg import qr
 
@@ -23,13 +21,6 @@ EXACT = 1e-12  # a combination with a smaller share of the noisiest one's varian
 MAX_STEPS_TLS = 100
 TOLERANCE_TLS = 1e-10  # relative change of the effort's noise at which the iteration stops
 MAX_NOISE_SHARE = 0.5  # with a larger share of noise in a combination's square, its motion is not known
-
-
-class Noise(NamedTuple):
-    """The noise in the squares of p scaled columns, in its principal axes: C = V diag(variance) V'."""
-
-    axes: Array  # V (p, p), those without noise first
-    variance: Array  # (p,)
 
 
 def estimate(problem: Regression) -> Estimate:
@@ -72,32 +63,35 @@ def refuse_noisy(problem: Regression, R: Triangle, C: Array) -> None:
 def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
     """Fit the scaled parameters (p,) with the effort's noise from their residual, at least `v_min`."""
     variance, axes = np.linalg.eigh(C)
-    noise = Noise(axes, np.where(variance > EXACT * variance[-1], variance, 0.0))
+    variance = np.where(variance > EXACT * variance[-1], variance, 0.0)
     theta = R.theta * R.scale
     floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y + R.min_squares))
     v = 0.0
     for _ in range(MAX_STEPS_TLS):
         squares = R.min_squares + float(((R.U @ theta - R.y) ** 2).sum())
         before, v = v, max(squares - float(theta @ C @ theta), floor)
-        theta = fit_for_noise(R, noise, v)
+        theta = fit_for_noise(R, axes, variance, v)
         if abs(v - before) <= TOLERANCE_TLS * v:
             break
     return theta
 
 
-def fit_for_noise(R: Triangle, noise: Noise, v: float) -> Array:
-    """Fit the scaled parameters (p,) for noise v of the effort: QR of the exact columns, then SVD of the others."""
+def fit_for_noise(R: Triangle, axes: Array, variance: Array, v: float) -> Array:
+    """Fit the scaled parameters (p,) for noise v of the effort: QR of the exact columns, then SVD of the others.
+
+    C = V diag(variance) V' is the noise in the squares of the columns, its axes V (p, p) without noise first.
+    """
     p = len(R.y)
     M = np.zeros((p + 1, p + 1))
-    M[:p, :p], M[:p, p], M[p, p] = R.U @ noise.axes, R.y, np.sqrt(R.min_squares)
+    M[:p, :p], M[:p, p], M[p, p] = R.U @ axes, R.y, np.sqrt(R.min_squares)
     (T,) = qr(M, mode="r")
-    k = int((noise.variance == 0).sum())
-    sizes = np.sqrt(np.r_[noise.variance[k:], v])
+    k = int((variance == 0).sum())
+    sizes = np.sqrt(np.r_[variance[k:], v])
     _, _, right = np.linalg.svd(T[k:, k:] / sizes)
     noisy = right[-1] / sizes
     z = -noisy[:-1] / noisy[-1]
     exact = np.linalg.solve(T[:k, :k], T[:k, p] - T[:k, k:p] @ z)
-    return np.asarray(noise.axes @ np.r_[exact, z])
+    return np.asarray(axes @ np.r_[exact, z])
 
 
 def standard_errors(problem: Regression, weight: Array, R: Triangle, C: Array, theta: Array) -> StandardErrors:

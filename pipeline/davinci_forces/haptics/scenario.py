@@ -23,6 +23,9 @@ MAX_TICKS = 2_000_000  # ticks of one simulation
 MAX_DELAY = 5.0  # [s] largest delay of positions or forces on the link
 
 
+Pair = tuple[float, float]
+
+
 class BadHaptics(PipelineError):
     """A haptic scenario is invalid; the message lists every problem with its place."""
 
@@ -33,8 +36,8 @@ class Body(NamedTuple):
     inertia: float  # [kg]
     gravity: float  # [N] effort that holds its weight
     viscous: float  # [N s/m]
-    coulomb: tuple[float, float]  # [N] upwards, downwards
-    static: tuple[float, float]
+    coulomb: Pair  # [N] upwards, downwards
+    static: Pair
     stribeck_velocity: float = 0.01  # [m/s]
     bristle_stiffness: float = 0.0  # [N/m]; 0 for none
     bristle_damping: float = 0.0  # [N s/m]
@@ -123,7 +126,12 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         title=table.text("title", default.title),
         seed=table.whole("seed", default.seed),
         hands=_hands(table) or default.hands,
-        device=_device(device),
+        device=Device(
+            device.number("motion_scale", DEVICE.motion, above=0.0),
+            device.number("force_scale", DEVICE.force, low=0.0),
+            device.number("strongest", above=0.0) if "strongest" in device else DEVICE.strongest,
+            device.number("position_step", DEVICE.step, low=0.0),
+        ),
         reach=device.number("reach", default.reach, above=0.0),
         link_rate=link.number("rate", default.link_rate, above=0.0),
         position_delay=_delay(link, "position_delay"),
@@ -133,7 +141,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         exact=arm.text("follows", "cascade", ("cascade", "exactly")) == "exactly",
         motor=Motors(*_joint_arrays(arm.table("motor"), default.motor)),
         law=Cascade(*_joint_arrays(arm.table("control"), default.law)),
-        stops=_stops(arm, default.stops),
+        stops=read_stops(arm, default.stops),
         body=_body(arm.table("body")) if "body" in arm else None,
         noise=_noise(arm.table("noise")) if "noise" in arm else None,
         assumed_body=assumed_body,
@@ -141,9 +149,12 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         q_tau=q_tau,
         stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
         damping=tissue.number("damping", default.damping, low=0.0),
-        friction=_below_one(tissue, "friction", default.friction),
+        friction=tissue.number("friction", default.friction, low=0.0),
         plan=_plan(table),
     )
+    if scenario.friction >= 1.0:
+        problem = f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls"
+        tissue.problem(problem, "friction")
     for part in (device, link, arm, tissue, table):
         part.close()
     _check_clocks(link, arm, scenario)
@@ -167,15 +178,6 @@ def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
     return tuple(hands)
 
 
-def _device(table: TomlTable) -> Device:
-    return Device(
-        table.number("motion_scale", DEVICE.motion, above=0.0),
-        table.number("force_scale", DEVICE.force, low=0.0),
-        table.number("strongest", above=0.0) if "strongest" in table else DEVICE.strongest,
-        table.number("position_step", DEVICE.step, low=0.0),
-    )
-
-
 def _delay(table: TomlTable, key: str) -> float:
     delay = table.number(key, 0.0, low=0.0)
     if delay > MAX_DELAY:
@@ -194,7 +196,8 @@ def _joint_arrays(table: TomlTable, default: Motors | Cascade) -> list[np.ndarra
     return columns
 
 
-def _stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, float]:
+def read_stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, float]:
+    """Read the lower and upper end stop of a joint."""
     low, high = table.numbers("stops", list(default), count=2) or default
     if low >= high:
         table.problem(f"stops must be lower and upper, not {low:g} and {high:g}", "stops")
@@ -202,28 +205,27 @@ def _stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, float
 
 
 def _body(table: TomlTable) -> Body:
-    coulomb = _pair(table, "coulomb", None)
-    body = Body(
-        table.number("inertia", above=0.0),
-        table.number("gravity", 0.0),
-        table.number("viscous", low=0.0),
-        coulomb,
-        _pair(table, "static", coulomb),
-        table.number("stribeck_velocity", 0.01, above=0.0),
-        table.number("bristle_stiffness", 0.0, low=0.0),
-        table.number("bristle_damping", 0.0, low=0.0),
-    )
-    if body.bristle_stiffness > 0.0 and min(coulomb) <= 0.0:
-        table.problem("bristles need Coulomb friction greater than 0", "coulomb")
+    body = Body(table.number("inertia", above=0.0), table.number("gravity", 0.0), *read_friction(table))
     table.close()
     return body
 
 
-def _pair(table: TomlTable, key: str, default: tuple[float, float] | None) -> tuple[float, float]:
-    up, down = table.numbers(key, list(default) if default else None, count=2) or (1.0, 1.0)
-    if min(up, down) < 0.0:
-        table.problem(f"{key} must be two numbers that are not negative, up and down, but is {[up, down]}", key)
-    return up, down
+def read_friction(table: TomlTable) -> tuple[float, Pair, Pair, float, float, float]:
+    """Read the friction of a joint: the fields of `Body` from `viscous` on."""
+    coulomb = table.numbers("coulomb", count=2) or (1.0, 1.0)
+    static = table.numbers("static", list(coulomb), count=2) or coulomb
+    for key, values in (("coulomb", coulomb), ("static", static)):
+        if min(values) < 0.0:
+            table.problem(f"{key} must be two numbers that are not negative, up and down, but is {list(values)}", key)
+    bristles = table.number("bristle_stiffness", 0.0, low=0.0)
+    if bristles > 0.0 and min(coulomb) <= 0.0:
+        table.problem("bristles need Coulomb friction greater than 0", "coulomb")
+    velocity, damping = (
+        table.number("stribeck_velocity", 0.01, above=0.0),
+        table.number("bristle_damping", 0.0, low=0.0),
+    )
+    (up, down), (static_up, static_down) = coulomb, static
+    return table.number("viscous", low=0.0), (up, down), (static_up, static_down), velocity, bristles, damping
 
 
 def _noise(table: TomlTable) -> AxisNoise:
@@ -239,13 +241,6 @@ def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
     assumed_body = _body(table.table("body")) if "body" in table else None
     table.close()
     return filtered, q_tau, assumed_body
-
-
-def _below_one(table: TomlTable, key: str, default: float) -> float:
-    value = table.number(key, default, low=0.0)
-    if value >= 1.0:
-        table.problem(f"{key} must be below 1, not {value:g}, because tissue never pulls", key)
-    return value
 
 
 def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:

@@ -134,14 +134,9 @@ class Candidate(NamedTuple):
                 return None
         return combine_efforts(results)
 
-    def parameters(self, out: Booleans | None = None) -> list[Array]:
-        """Fit theta of each part to all cells, or without some of them."""
-        thetas = []
-        for part in self.parts:
-            cells = part.by_block
-            used = np.ones(len(cells.gram), np.bool_) if out is None else ~out
-            thetas.append(solve(cells.sum_cells(used), part.ridge))
-        return thetas
+    def parameters(self) -> list[Array]:
+        """Fit theta of each part to all cells."""
+        return [solve(sum_all(part.by_block), part.ridge) for part in self.parts]
 
     @property
     def is_physical(self) -> bool:
@@ -151,12 +146,9 @@ class Candidate(NamedTuple):
 
 
 def candidates(
-    robot: Robot,
-    separate: dict[str, tuple[Observed, ...]],
-    arm: tuple[Observed, ...],
-    reaches: dict[str, Reach],
+    robot: Robot, separate: dict[str, tuple[Observed, ...]], arm: tuple[Observed, ...], reaches: dict[str, Reach],
     count: int,
-) -> list[Candidate]:
+) -> list[Candidate]:  # fmt: skip
     """Return all candidate models of `count` logs.
 
     `separate` are the logs of each joint alone, `arm` the logs of all joints together.
@@ -173,9 +165,8 @@ def candidates(
     if share_parameters(robot, rows):
         plain = next(c for c in models if c.structure == "coupled" and not c.added)
         weights = 1.0 / np.array([residual_variance(part) for part in plain.parts])
-        models += variants(
-            robot, "coupled", reaches, [library(coupled_joints(robot, rows, added), arm, count)], weights
-        )
+        shared = library(coupled_joints(robot, rows, added), arm, count)
+        models += variants(robot, "coupled", reaches, [shared], weights)
     return models
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart
 from davinci_forces.identification.model_error import model_std, std_over_periods
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.selection import (
@@ -69,7 +69,8 @@ class BlockEstimate(NamedTuple):
 
 def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection | None:
     """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
-    schemes = usable_schemes(candidates, count)
+    by_library = {id(part.library): part.library.cells.by_block.squares for c in candidates for part in c.parts}
+    schemes = schemes_of(np.concatenate(list(by_library.values()), axis=1), count)
     pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes))] if schemes else []
     if not pairs:
         return None
@@ -91,12 +92,6 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
         best=models[best],
         why=reason(models, results, [c.size for c in models], chosen, best),
     )
-
-
-def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
-    """Return the leave-out schemes in which each refit has data of every effort of all candidates."""
-    by_library = {id(part.library): part.library.cells.by_block.squares for c in candidates for part in c.parts}
-    return schemes_of(np.concatenate(list(by_library.values()), axis=1), count)
 
 
 def better(fixed: Selection, searched: Selection | None) -> Selection:

@@ -96,7 +96,8 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
         return ""
     text = f"its own terms explain {percent(max(r2, 0.0))} of the effort's variance"
     if others:
-        return f"{text}: {joints_move(others)} in the same logs, which its terms omit; record the joint by itself"
+        move = f"{join_names(others)} move{'s' if len(others) == 1 else ''}"
+        return f"{text}: {move} in the same logs, which its terms omit; record the joint by itself"
     return f"{text}: check that its effort and motion are channels of one joint, and which terms its model needs"
 
 
@@ -104,11 +105,6 @@ def join_names(names: Sequence[str]) -> str:
     """Join names: 'a, b and c'."""
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last
-
-
-def joints_move(joints: Sequence[str]) -> str:
-    """Return the clause 'a moves', or 'a and b move'."""
-    return f"{join_names(joints)} move{'s' if len(joints) == 1 else ''}"
 
 
 def percent(share: float) -> str:

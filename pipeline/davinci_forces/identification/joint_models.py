@@ -96,7 +96,7 @@ class LogModels:
     def with_fit(self, model: JointModel, fit: Fit) -> JointModel:
         """Return a joint's model by another fit, without predictions of unseen data."""
         unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
-        return JointModel.derive(model, **self.fields_of(fit, model.joint), **unknown)
+        return JointModel.like(model, **self.fields_of(fit, model.joint), **unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:

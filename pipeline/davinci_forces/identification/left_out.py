@@ -12,7 +12,7 @@ from davinci_forces.estimators.problem import Prior, Regression
 from davinci_forces.identification.observations import averaged_samples, is_evaluated, observe, pose_samples
 from davinci_forces.identification.regression import known_of, pose, recorded_motion, stands_still
 from davinci_forces.identification.scores import Scorer, folds, select_samples
-from davinci_forces.maths.arrays import Array, Integers
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.periods import averaging
@@ -76,22 +76,16 @@ def without_folds(
     part: Motion, average: Trajectory, model: IndependentJoint, prior: Prior
 ) -> tuple[list[slice], list[Regression]]:
     """Return the samples of each fold of a log's whole periods, and the least squares problem of the other folds."""
-    fold, measured = fold_of(part.t, average), part.filled == 0
+    period = np.minimum(((part.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
+    fold, measured = np.array(folds(average.periods))[period], part.filled == 0
     problem, moving = pose(model, [average], prior), ~stands_still(average)
+    samples = part.t[measured], part.tau[measured], average.period, len(average.t), fold[measured]
     others = [
         replace(problem, tau=effort.mean, tau_var=effort.var, periods=np.where(moving, effort.counts, 0))
-        for effort in averaging.left_out(
-            part.t[measured], part.tau[measured], average.period, len(average.t), fold[measured]
-        )
+        for effort in averaging.left_out(*samples)
     ]
     ends = np.searchsorted(fold, np.arange(len(others) + 1)).tolist()
     return [slice(start, end) for start, end in pairwise(ends)], others
-
-
-def fold_of(t: Array, average: Trajectory) -> Integers:
-    """Return the fold of periods (N,) of samples at these times [s] in whole periods; it never decreases."""
-    period = np.minimum(((t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
-    return np.asarray(np.array(folds(average.periods))[period])
 
 
 def without_a_segment(

@@ -83,7 +83,7 @@ def std_over_periods(part: CandidatePart, logs: int) -> Array:
 def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:
     """Jackknife the standard errors (p,) of parameters over groups of cells, by their number (C,)."""
     groups = [number == n for n in np.unique(number) if cells.squares[number == n].any()]
-    return of_left_out(np.array([solve(cells.omit_cells(out), ridge) for out in groups]))
+    return of_left_out(np.array([solve(cells.sum_cells(~out), ridge) for out in groups]))
 
 
 def other_models(

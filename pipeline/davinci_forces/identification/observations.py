@@ -68,12 +68,8 @@ class Observed(NamedTuple):
         """Return the log of one joint alone."""
         column, motion = slice(joint, joint + 1), self.motions[joint]
         motion = motion._replace(**{name: getattr(motion, name)[:, column] for name in ("q", "dq", "ddq")})
-        return self._replace(
-            records=self.records[column],
-            processing=self.processing[column],
-            motions=(motion,),
-            still=self.still[:, column],
-        )
+        records, processing, still = self.records[column], self.processing[column], self.still[:, column]
+        return self._replace(records=records, processing=processing, motions=(motion,), still=still)
 
     def first_samples(self, number: int) -> "Observed":
         """Return the first samples of a longer log."""
@@ -111,8 +107,8 @@ class Observed(NamedTuple):
         Phi = np.zeros((len(samples), len(columns), len(model.parameters)))
         for efforts_of_part, (rows, taken) in parts.items():
             Phi[:, list(efforts_of_part)] = rows[np.searchsorted(taken, samples)]
-        tau = [smooth_effort(self.records[i], cutoff or self.processing[i].cutoff)[samples] for i in columns]
-        return Phi, np.stack(tau, axis=1), samples
+        efforts_of = (smooth_effort(self.records[i], cutoff or self.processing[i].cutoff) for i in columns)
+        return Phi, np.stack([tau[samples] for tau in efforts_of], axis=1), samples
 
     def _smooth_rows(
         self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoff: float, wanted: Booleans

@@ -120,7 +120,7 @@ class JointSearch:
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, len(self.logs))
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
             steps = []
-            for strength in neighbours(RIDGE_GRID, near, 1) if near else RIDGE_GRID:
+            for strength in neighbours(RIDGE_GRID, near) if near else RIDGE_GRID:
                 ridge = Ridge(strength, np.ones(1), equations.combination)
                 try:
                     errors = cross_validate(cells, ridge, self._schemes, scored)
@@ -153,9 +153,9 @@ class JointSearch:
         cutoffs = sorted({*(x for x in CUTOFF_GRID if x <= MAX_CUTOFF * rate), start.cutoff})
         while True:
             cutoff, lag = step.processing
-            options = [Processing(x, lag) for x in (cutoffs if everywhere else neighbours(cutoffs, cutoff, 1))]
+            options = [Processing(x, lag) for x in (cutoffs if everywhere else neighbours(cutoffs, cutoff))]
             better = self.best_processing(step, options)
-            lags = LAG_GRID if everywhere else neighbours(LAG_GRID, lag, 1)
+            lags = LAG_GRID if everywhere else neighbours(LAG_GRID, lag)
             better = self.best_processing(better, [Processing(better.processing.cutoff, x) for x in lags])
             if better.processing == step.processing:
                 return step
@@ -219,10 +219,10 @@ def joint_model(
     return coupled_joints(robot, [[j.name for j in robot.joints].index(joint)], {joint: terms}, name)
 
 
-def neighbours(values: Sequence[float], value: float, reach: int) -> Sequence[float]:
-    """Return the value of a sorted list that is nearest to a number, and up to `reach` values on either side."""
+def neighbours(values: Sequence[float], value: float) -> Sequence[float]:
+    """Return the value of a sorted list that is nearest to a number, and the values on either side."""
     i = int(np.argmin(np.abs(np.array(values) - value)))
-    return values[max(i - reach, 0) : i + reach + 1]
+    return values[max(i - 1, 0) : i + 2]
 
 
 def searched_logs(logs: Sequence[Observed]) -> list[Observed]:
@@ -232,12 +232,9 @@ def searched_logs(logs: Sequence[Observed]) -> list[Observed]:
 
 
 def search_joints(
-    robot: Robot,
-    separate: dict[str, tuple[Observed, ...]],
-    arm: tuple[Observed, ...],
-    reaches: dict[str, Reach],
+    robot: Robot, separate: dict[str, tuple[Observed, ...]], arm: tuple[Observed, ...], reaches: dict[str, Reach],
     lowpass: float,
-) -> list[SearchResult]:
+) -> list[SearchResult]:  # fmt: skip
     """Search for the model of each joint, by itself and, if `arm` has logs of all joints, coupled to the others."""
     searches = []
     for joint, logs in separate.items():
@@ -258,12 +255,9 @@ def best_of_joints(searches: Sequence[SearchResult]) -> list[SearchResult]:
 
 
 def searched_candidates(
-    robot: Robot,
-    searches: Sequence[SearchResult],
-    separate: dict[str, tuple[Observed, ...]],
-    arm: tuple[Observed, ...],
-    count: int,
-) -> list[Candidate]:
+    robot: Robot, searches: Sequence[SearchResult], separate: dict[str, tuple[Observed, ...]],
+    arm: tuple[Observed, ...], count: int,
+) -> list[Candidate]:  # fmt: skip
     """Return the models that were searched: the best of each joint by itself, and coupled joints that share links."""
     best = best_of_joints(searches)
     if len(best) < len(separate):
@@ -281,15 +275,9 @@ def searched_candidates(
             part = shared_part(robot, [coupled[i] for i in sharing], arm, count, weights[sharing])
             name = "" if alone is None else f" except for {coupled[alone].joint}"
             separately = () if alone is None else (alone_parts[alone],)
-            models += [
-                Candidate(
-                    f"searched, links shared{name}{ridge_name(strength)}",
-                    CHOSEN,
-                    describe_terms(coupled),
-                    (part.with_ridge(strength), *separately),
-                )
-                for strength in RIDGE_GRID
-            ]
+            for strength in RIDGE_GRID:
+                full_name, joined = f"searched, links shared{name}{ridge_name(strength)}", part.with_ridge(strength)
+                models.append(Candidate(full_name, CHOSEN, describe_terms(coupled), (joined, *separately)))
     return models
 
 
@@ -311,9 +299,8 @@ def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], 
     step = search.chosen
     model = joint_model(robot, search.joint, search.structure, step.terms)
     equations = library(model, [log.process([step.processing] * len(log.records)) for log in logs], count)
-    return CandidatePart(
-        model, equations, equations.columns(model), Ridge(step.strength, np.ones(1), equations.combination)
-    )
+    ridge = Ridge(step.strength, np.ones(1), equations.combination)
+    return CandidatePart(model, equations, equations.columns(model), ridge)
 
 
 def describe_terms(searches: Sequence[SearchResult]) -> str:

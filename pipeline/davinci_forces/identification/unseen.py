@@ -41,7 +41,7 @@ class RefitModel:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
         key = out.tobytes()
         if key not in self._thetas:
-            self._thetas[key] = solve(cells.omit_cells(out), self._ridge)
+            self._thetas[key] = solve(cells.sum_cells(~out), self._ridge)
         return self._thetas[key]
 
 

@@ -74,20 +74,15 @@ class BinaryLog(Log):
         yield from read_ahead(self._blocks(names))
 
     def _blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        number = {channel.name: i for i, channel in enumerate(self.channels)}
-        with open_file(self.path) as file:
-            for rows in self._rows(file):
-                yield self.count_nans({name: rows[:, number[name]].astype(np.float64) for name in names})
-
-    def _rows(self, file: BinaryIO) -> Iterator[np.ndarray[tuple[int, int], np.dtype[np.generic]]]:
-        """Read the rows of every piece, a block at a time."""
-        columns = len(self.channels)
+        number, columns = {channel.name: i for i, channel in enumerate(self.channels)}, len(self.channels)
         most = max(1, BLOCK_CELLS // columns)
-        for position, rows in self.pieces:
-            file.seek(position)
-            for first in range(0, rows, most):
-                content = file.read(min(most, rows - first) * columns * self.dtype.itemsize)
-                yield np.frombuffer(content, self.dtype).reshape(-1, columns)
+        with open_file(self.path) as file:
+            for position, rows in self.pieces:
+                file.seek(position)
+                for first in range(0, rows, most):
+                    content = file.read(min(most, rows - first) * columns * self.dtype.itemsize)
+                    cells = np.frombuffer(content, self.dtype).reshape(-1, columns)
+                    yield self.count_nans({name: cells[:, number[name]].astype(np.float64) for name in names})
 
 
 Pieces = list[tuple[int, int]]

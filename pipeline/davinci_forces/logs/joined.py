@@ -38,13 +38,7 @@ MIN_SHARE_AGREEING = 0.95  # of stamps that agree with those of another clock, i
 
 
 def open_joined(files: Sequence[Path], options: Options) -> Log:
-    """Open files that were recorded at the same time.
-
-    Raises
-    ------
-    BadLog
-        If one cannot be read, or two are equal.
-    """
+    """Open files that were recorded at the same time; raises BadLog if one cannot be read, or two are equal."""
     require_different(files)
     return Joined([open_log(file, options) for file in files])
 

@@ -12,13 +12,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Refuse the file, and say how to convert it to TDMS.
-
-    Raises
-    ------
-    BadLog
-        Always.
-    """
+    """Refuse the file by a BadLog, which says how to convert it to TDMS."""
     raise BadLog(
         f"{path}: TDM files (.tdm, with their numbers in a .tdx) are not read; save it as TDMS, with DIAdem or with "
         "LabVIEW's Convert to TDMS, and name that file in study.toml"

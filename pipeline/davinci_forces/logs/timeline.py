@@ -51,11 +51,6 @@ class Timeline:
         """Time at which the next sample is due [s]; 0 before the first."""
         return self.start[-1] + (self.rows - self.first[-1]) * self.step[-1] if self.first else 0.0
 
-    @property
-    def is_uniform(self) -> bool:
-        """Whether all samples have one sampling time and no gap between them."""
-        return len(self.first) == 1
-
     def times(self, row: int, count: int) -> Array:
         """Compute the times (count,) [s] of the samples from a row on; times after the last sample are extrapolated."""
         begin, end = bisect_right(self.first, row) - 1, bisect_right(self.first, row + count - 1)

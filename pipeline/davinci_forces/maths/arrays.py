@@ -1,5 +1,7 @@
 """Types of arrays; docstrings give their shapes and units."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,3 +20,11 @@ def row_blocks(N: int) -> list[slice]:
 def evenly(N: int, most: int) -> Integers:
     """Indices of at most `most` of N samples, evenly spaced, including the first and the last."""
     return np.linspace(0, N - 1, min(N, most)).round().astype(np.int64)
+
+
+def records(columns: Any) -> NDArray[np.void]:
+    """The columns (n,) of a named tuple as one array of records (n,), which is one argument of compiled code."""
+    table = np.empty(len(columns[0]), [(name, float) for name in columns._fields])
+    for name, column in zip(columns._fields, columns, strict=True):
+        table[name] = column
+    return table

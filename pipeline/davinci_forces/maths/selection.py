@@ -40,10 +40,6 @@ class Equations(NamedTuple):
     right: Array  # (C, m, p)
     squares: Array  # (C, m)
 
-    def omit_cells(self, cells: Booleans) -> "Equations":
-        """Sum the equations of all cells but these (C,)."""
-        return self.sum_cells(~cells)
-
     def sum_cells(self, cells: Booleans) -> "Equations":
         """Sum the equations of these cells (C,)."""
         return Equations(*(part[cells].sum(axis=0, keepdims=True) for part in self))
@@ -219,7 +215,7 @@ def cross_validate(
     whole = scored.squares.sum(axis=0)
     unseen, fitted, of_all = [], [], solve(sum_all(equations), ridge)
     for groups in schemes:
-        thetas = [solve(equations.omit_cells(out), ridge) for out in groups]
+        thetas = [solve(equations.sum_cells(~out), ridge) for out in groups]
         sums = [scored.sum_cells(out) for out in groups]
         errors = [group.errors(theta)[0] for group, theta in zip(sums, thetas, strict=True)]
         unseen.append(np.array(errors) / whole)
@@ -262,10 +258,7 @@ def choose_candidate(
     """
     indices = [i for i, good in enumerate(eligible) if good]
     best = min(indices, key=lambda i: candidates[i].score)
-    near = [
-        i
-        for i in indices
-        if candidates[i].score - candidates[best].score <= CLEARLY * standard_error(candidates[i], candidates[best])
-    ]
+    excess = {i: candidates[i].score - candidates[best].score for i in indices}
+    near = [i for i in indices if excess[i] <= CLEARLY * standard_error(candidates[i], candidates[best])]
     lowest = min(ranks[i] for i in near)
     return min((i for i in indices if ranks[i] == lowest), key=lambda i: candidates[i].score), best

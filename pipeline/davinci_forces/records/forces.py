@@ -30,6 +30,8 @@ class FilterNoise(JointRecord):
     The columns have what another `delay` would cost: the standard deviation of the filter at rest.
     """
 
+    PUBLISHED = ("tuning.{joint}: r_q r_dq r_tau q_tau",)
+
     logs: Names
     rate: float
     r_q: float
@@ -41,10 +43,6 @@ class FilterNoise(JointRecord):
     viscous: float
     trial_delay: Column
     trial_std: Column
-
-    def published(self) -> Iterator[Published]:
-        """The noise, and the random walk that follows a push at the rate of the identification logs."""
-        yield from self.publish(f"tuning.{self.joint}", "r_q", "r_dq", "r_tau", "q_tau")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +69,8 @@ class ErrorBand(JointRecord):
     The band of a log uses the rows of the other logs.
     """
 
+    PUBLISHED = ("band.{joint}: band_rms±",)
+
     band_rms: float
     band_rms_std: float
     source: Labels
@@ -81,10 +81,6 @@ class ErrorBand(JointRecord):
     tau_ext_std_filter: Column
     uncorrelated: Column
 
-    def published(self) -> Iterator[Published]:
-        """The error over all rows."""
-        yield from self.publish(f"band.{self.joint}", "band_rms", with_std=True)
-
 
 @dataclass(frozen=True, eq=False)
 class Track(LogJointRecord):
@@ -94,6 +90,12 @@ class Track(LogJointRecord):
     `free` windows, the uncertainty of the day's offset.  The filter's includes its lag; the smoother has none.  At
     standstill both include friction, which takes any value up to the static level.
     """
+
+    PUBLISHED = (
+        "{filter}.{log}.{joint}: r_q r_dq q_dq q_tau filter_part lag_part tau_ext_rms± nis_mean± model_part± "
+        "day_offset±",
+        "effort.{log}.{joint}: smooth_part",
+    )
 
     model: str
     estimator: str
@@ -137,13 +139,6 @@ class Track(LogJointRecord):
     standing: Counts
     unscored: Counts
 
-    def published(self) -> Iterator[Published]:
-        """The effort outside contacts, the noise that the filter assumes, and the parts of its standard deviation."""
-        prefix = f"{self.filter}.{self.log}.{self.joint}"
-        yield from self.publish(prefix, "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
-        yield from self.publish(prefix, "tau_ext_rms", "nis_mean", "model_part", "day_offset", with_std=True)
-        yield from self.publish(f"effort.{self.log}.{self.joint}", "smooth_part")
-
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace(LogJointRecord):
@@ -178,12 +173,10 @@ class FreeSpace(LogJointRecord):
 
     def published(self) -> Iterator[Published]:
         """The levels, and the coverage of the stated band; of the smoother also by quartile of speed."""
-        yield from self.publish(self.prefix, "free_rms", "free_level", "detection_level", "coverage", with_std=True)
-        if self.filter != SMOOTHER:
-            return
-        yield from self.publish(self.prefix, "band_width")
-        for i in range(len(self)):
-            yield Published(f"{self.prefix}.coverage_q{i + 1}", "quartile_coverage", "quartile_coverage_std", i)
+        yield from self.publish(self.prefix, "free_rms± free_level± detection_level± coverage±")
+        if self.filter == SMOOTHER:
+            yield from self.publish(self.prefix, "band_width")
+            yield from self.publish(f"{self.prefix}.coverage_q{{row}}", "=quartile_coverage±")
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +187,10 @@ class Threshold(JointRecord):
     """
 
     KEY = ("joint", "filter")
+    PUBLISHED = (
+        "threshold.{joint}: detection_level± alarm_level±",
+        "band.{joint}: coverage± band_width",
+    )
 
     filter: str
     detection_level: float
@@ -206,13 +203,6 @@ class Threshold(JointRecord):
     coverage_std: float
     band_width: float
 
-    def published(self) -> Iterator[Published]:
-        """Both levels, and the coverage and width of the band over all logs."""
-        prefix = f"threshold.{self.joint}"
-        yield from self.publish(prefix, "detection_level", "alarm_level", with_std=True)
-        yield from self.publish(f"band.{self.joint}", "coverage", with_std=True)
-        yield from self.publish(f"band.{self.joint}", "band_width")
-
 
 @dataclass(frozen=True, eq=False)
 class Contact(LogJointRecord):
@@ -221,6 +211,8 @@ class Contact(LogJointRecord):
     The windows that the study states come first, then other detected contacts.  A window without a detected contact
     keeps its stated start and end.
     """
+
+    PUBLISHED = ("contact.{log}.{joint}.{row}: peak± mean± impulse± onset± release± duration± above stated found",)
 
     filter: str
     detection_level: float
@@ -242,19 +234,12 @@ class Contact(LogJointRecord):
     impulse_std: Column
     above: Counts
 
-    def published(self) -> Iterator[Published]:
-        """Every contact, numbered from 1."""
-        for i in range(len(self)):
-            prefix = f"contact.{self.log}.{self.joint}.{i + 1}"
-            yield from self.publish(
-                prefix, "peak", "mean", "impulse", "onset", "release", "duration", row=i, with_std=True
-            )
-            yield from self.publish(prefix, "above", "stated", "found", row=i)
-
 
 @dataclass(frozen=True, eq=False)
 class Streamed(LogJointRecord):
     """One joint of one log filtered as samples arrive, beside the smoother; a row is a contact."""
+
+    PUBLISHED = ("stream.{log}.{joint}: stream_delay free_rms± stream_loss± peak_ratio±",)
 
     role: str
     rate: float
@@ -272,16 +257,12 @@ class Streamed(LogJointRecord):
     smooth_peak: Column
     peak: Column
 
-    def published(self) -> Iterator[Published]:
-        """The delay of the motion, the effort in free motion, and the peaks of long contacts over the smoother's."""
-        prefix = f"stream.{self.log}.{self.joint}"
-        yield from self.publish(prefix, "stream_delay")
-        yield from self.publish(prefix, "free_rms", "stream_loss", "peak_ratio", with_std=True)
-
 
 @dataclass(frozen=True, eq=False)
 class StreamLevel(JointRecord):
     """The alarm level of one joint as samples arrive, over all its logs, and the contacts that exceed it."""
+
+    PUBLISHED = ("stream.{joint}: alarm_level± contacts contacts_found",)
 
     alarm_level: float
     alarm_level_std: float
@@ -289,11 +270,6 @@ class StreamLevel(JointRecord):
     stream_delay: float
     contacts: int
     contacts_found: int
-
-    def published(self) -> Iterator[Published]:
-        """The level, and how many contacts of the smoother exceed it."""
-        yield from self.publish(f"stream.{self.joint}", "alarm_level", with_std=True)
-        yield from self.publish(f"stream.{self.joint}", "contacts", "contacts_found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,6 +280,7 @@ class Comparison(LogJointRecord):
     """
 
     KEY = ("log", "joint", "filter")
+    PUBLISHED = ("{filter}.{log}.{joint}: push_share push_delay",)
 
     filter: str
     role: str
@@ -322,7 +299,6 @@ class Comparison(LogJointRecord):
 
     def published(self) -> Iterator[Published]:
         """The levels in free space, and the share and the delay of a push."""
-        prefix = f"{self.filter}.{self.log}.{self.joint}"
         if not self.default:
-            yield from self.publish(prefix, "free_rms", "free_level", "detection_level", with_std=True)
-        yield from self.publish(prefix, "push_share", "push_delay")
+            yield from self.publish("{filter}.{log}.{joint}", "free_rms± free_level± detection_level±")
+        yield from super().published()

@@ -22,6 +22,11 @@ class Fit(Record):
 
     KEY = ("group", "model", "estimator")
     ROWS = "parameter"
+    PUBLISHED = (
+        "fit.{group}.{model}.{estimator}.{slug}: =theta± std_noise=theta_std_noise std_model=theta_std_model "
+        "std_classical=theta_std_classical",
+        "fit.{group}.{model}.{estimator}: mse± r2± condition samples periods hac_lags=correlated_lags",
+    )
 
     group: str
     model: str
@@ -49,17 +54,6 @@ class Fit(Record):
     theta_std_model: Column
     theta_std_classical: Column
 
-    def published(self) -> Iterator[Published]:
-        """The parameters with their standard errors, and the fit to the averaged effort."""
-        prefix = ".".join(("fit", *self.key))
-        for i, parameter in enumerate(self.parameter):
-            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
-            for part in ("noise", "model", "classical"):
-                yield Published(f"{prefix}.{slug(parameter)}.std_{part}", f"theta_std_{part}", row=i)
-        yield from self.publish(prefix, "mse", "r2", with_std=True)
-        yield from self.publish(prefix, "condition", "samples", "periods")
-        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # results.json had this key before the field
-
 
 @dataclass(frozen=True, eq=False)
 class Guess(Record):
@@ -67,6 +61,10 @@ class Guess(Record):
 
     KEY = ("group",)
     ROWS = "parameter"
+    PUBLISHED = (
+        "guess.{group}.{slug}: =theta",
+        "guess.{group}: mse±",
+    )
 
     group: str
     mse: float
@@ -74,12 +72,6 @@ class Guess(Record):
     parameter: Labels
     unit: Labels
     theta: Column
-
-    def published(self) -> Iterator[Published]:
-        """The parameters, and the mean squared error that they leave."""
-        for i, parameter in enumerate(self.parameter):
-            yield Published(f"guess.{self.group}.{slug(parameter)}", "theta", row=i)
-        yield from self.publish(f"guess.{self.group}", "mse", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +94,7 @@ class SwarmSearch(Record):
     """A particle swarm search for the parameters of a model, with the lowest error after each iteration."""
 
     KEY = ("group", "model", "estimator", "walls")
+    PUBLISHED = ("search.{group}.{model}.{estimator}.{walls}: mse± excess searched swarms iterations",)
 
     group: str
     model: str
@@ -116,12 +109,6 @@ class SwarmSearch(Record):
     mse: float
     mse_std: float
     best_mse: Column
-
-    def published(self) -> Iterator[Published]:
-        """The error reached, and the number of iterations."""
-        prefix = ".".join(("search", *self.key))
-        yield from self.publish(prefix, "mse", with_std=True)
-        yield from self.publish(prefix, "excess", "searched", "swarms", "iterations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +129,7 @@ class Identifiability(Record):
 
     def published(self) -> Iterator[Published]:
         """The condition number, and the correlation of every pair of parameters, once."""
-        yield Published(f"identifiability.{'.'.join(self.key)}.condition", "scaled_condition")
+        yield from self.publish("identifiability.{group}.{model}", "condition=scaled_condition")
         names = list(dict.fromkeys(self.parameter))
         for i, (a, b) in enumerate(zip(self.parameter, self.beside, strict=True)):
             if names.index(a) < names.index(b):
@@ -190,6 +177,7 @@ class Choice(Record):
     KEY = ("group",)
     UNKNOWN = "over_periods", "over_periods_std"
     ROWS = "candidate"
+    PUBLISHED = ("choice.{group}.{slug}: score± training± over_periods± parameters",)
 
     group: str
     model: str
@@ -209,13 +197,6 @@ class Choice(Record):
     training_std: Column
     over_periods: Column
     over_periods_std: Column
-
-    def published(self) -> Iterator[Published]:
-        """The scores of every candidate."""
-        for i, candidate in enumerate(self.candidate):
-            prefix = f"choice.{self.group}.{slug(candidate)}"
-            yield from self.publish(prefix, "score", "training", "over_periods", row=i, with_std=True)
-            yield from self.publish(prefix, "parameters", row=i)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,10 +226,9 @@ class ModelSearch(JointRecord):
         """The cutoff, the lag, the ridge and the added terms, each with its scale, if the chosen model has them."""
         if not self.used:
             return
-        prefix = f"choice.{self.joint}"
-        yield from self.publish(prefix, "cutoff", "effort_lag", "ridge")
+        yield from self.publish("choice.{joint}", "cutoff effort_lag ridge")
         for i, term in enumerate(self.term):
-            yield Published(f"{prefix}.term.{slug(term)}", "term_scale", row=i)
+            yield Published(f"choice.{self.joint}.term.{slug(term)}", "term_scale", row=i)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,10 @@ class Links(RobotRecord):
 
     UNKNOWN = ("alpha", "a", "d", "offset", "mass")  # NaN for a link without these parameters
     ROWS = "link"
+    PUBLISHED = (
+        "robot: worst_condition",
+        "robot.link.{name}: alpha a d offset mass",
+    )
 
     worst_condition: float  # largest condition number of the tip's Jacobian in the workspace
     link: Labels
@@ -22,12 +26,6 @@ class Links(RobotRecord):
     offset: Column
     moved_by: Counts  # number of the coordinate, from 1; 0 for a link that no coordinate moves
     mass: Column
-
-    def published(self) -> Iterator[Published]:
-        """The numbers of results.json: geometry of every link, and worst condition of the tip's Jacobian."""
-        yield Published("robot.worst_condition", "worst_condition")
-        for i, link in enumerate(self.link):
-            yield from self.publish(f"robot.link.{link}", "alpha", "a", "d", "offset", "mass", row=i)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,7 @@ class Control(Record):
     """The motion of one joint in a simulated control study of chapter 5."""
 
     KEY = ("controller", "joint")
+    PUBLISHED = ("control.{controller}.{joint}: start reference settling_time overshoot error_10 error_20 error_end",)
 
     controller: str
     joint: str
@@ -73,17 +72,13 @@ class Control(Record):
     q: Column
     dq: Column
 
-    def published(self) -> Iterator[Published]:
-        """How well the joint tracks its reference."""
-        names = ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end")
-        yield from self.publish(f"control.{self.controller}.{self.joint}", *names)
-
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov(Record):
     """The Lyapunov function over time in a simulated control study.  (5.9)"""
 
     KEY = ("controller",)
+    PUBLISHED = ("control.{controller}: V_rise V_0",)
 
     controller: str
     V_rise: float
@@ -91,16 +86,13 @@ class Lyapunov(Record):
     t: Column
     V: Column
 
-    def published(self) -> Iterator[Published]:
-        """The initial value, and the largest rise from one sample to the next."""
-        yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
-
 
 @dataclass(frozen=True, eq=False)
 class Excitation(JointRecord):
     """One period of an excitation trajectory, of the thesis or designed, its criteria and its excess over limits."""
 
     KEY = ("joint", "source")
+    PUBLISHED = ("excitation.{joint}.{source}: period objective condition excess_q excess_dq excess_ddq",)
 
     source: str
     period: float
@@ -117,9 +109,7 @@ class Excitation(JointRecord):
 
     def published(self) -> Iterator[Published]:
         """The criteria, the excess over limits, and the coefficients under the names of Table 6.1."""
-        prefix = f"excitation.{self.joint}.{self.source}"
-        names = ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq")
-        yield from self.publish(prefix, *names)
+        yield from super().published()
         for i in range(len(self.coefficients)):
             letter = "a" if i == 0 or i % 2 else "b"
-            yield Published(f"{prefix}.{letter}{(i + 1) // 2}", "coefficients", row=i)
+            yield Published(f"excitation.{self.joint}.{self.source}.{letter}{(i + 1) // 2}", "coefficients", row=i)

@@ -56,22 +56,20 @@ class Prediction(LogJointRecord):
 
     def published(self) -> Iterator[Published]:
         """The scores."""
-        scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
-        errors = ("relative_error", "relative_error_1111", "model_error", "mean_error")
-        yield from self.publish(self.prefix, *scores, *errors, with_std=True)
+        scores = "rmse± nrmse± r2± fit_percent± r2_ceiling± effort_rms±"
+        errors = "relative_error± relative_error_1111± model_error± mean_error±"
+        return self.publish(self.prefix, f"{scores} {errors}")
 
 
 @dataclass(frozen=True, eq=False)
 class PathShare(LogJointRecord):
     """The share of a joint's path that no other identification log follows, and the share of time in motion."""
 
+    PUBLISHED = ("path.{log}.{joint}: path_new moving",)
+
     role: str
     path_new: float
     moving: float
-
-    def published(self) -> Iterator[Published]:
-        """Both shares."""
-        yield from self.publish(f"path.{self.log}.{self.joint}", "path_new", "moving")
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,11 @@
 A record has a few scalars, which describe its subject, and columns of one length, which hold measurements or
 estimates.  Its constructor checks it, so that stages can rely on it and `store` can write every kind in the same way.
 Every field is a symbol of `quantities`.  `KEY` names the scalars that identify a record among its kind and give its
-file name.  `published` lists the numbers of the record in results.json.
+file name.
+
+`PUBLISHED` lists the numbers of the record in results.json: a prefix of keys, which may hold scalars, and fields, as in
+`tuning.{joint}: r_q rmse±`.  `±` adds the standard error, and `key=field` renames the field; an empty key is the
+prefix itself.  With `{row}` (its number from 1), `{name}` or `{slug}` in the prefix, each row of the columns has keys.
 """
 
 import re
@@ -49,6 +53,7 @@ class Record:
     KEY: ClassVar[Names]
     UNKNOWN: ClassVar[Names] = ()  # columns in which NaN means unknown
     ROWS: ClassVar[str] = ""  # the column of row names, where rows have names
+    PUBLISHED: ClassVar[Names] = ()
     origin: ClassVar[Origin | None] = None  # set by `store` on the records that it reads
 
     @classmethod
@@ -65,6 +70,22 @@ class Record:
     def scalars(cls) -> Names:
         """Return the names of the scalar fields."""
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
+
+    @classmethod
+    def like(cls, source: object, **others: Any) -> Self:
+        """Return a record of other values, and for the rest the attributes of these names of a source.
+
+        A record with columns of a lazy source is lazy, too.
+        """
+        read, is_shared = getattr(source, "_read", None), not others.keys() >= {*cls.columns()}
+        names = cls.scalars() if read and is_shared else tuple(f.name for f in fields(cls))  # type: ignore[arg-type]
+        values = others | {name: getattr(source, name) for name in names if name not in others and hasattr(source, name)}
+        if not (read and is_shared):
+            return cls(**values)
+        columns = {name: values.pop(name) for name in cls.columns() if name in values}
+        return cls.lazy(values, len(source), lambda name, rows: (
+            columns[name][rows] if name in columns else read(name, rows)
+        ))  # fmt: skip
 
     @classmethod
     def lazy(cls, scalars: Mapping[str, Any], length: int, read: Callable[[str, slice], NDArray[Any]]) -> Self:
@@ -91,17 +112,6 @@ class Record:
         is_long = len(self) > BLOCK_SAMPLES
         return (self.part(rows) for rows in row_blocks(len(self))) if is_long else iter([self])
 
-    @classmethod
-    def derive(cls, source: "Record", **changes: Any) -> Self:
-        """Return a record with some fields of another record; what is lazy there remains lazy."""
-        scalars = {name: changes[name] if name in changes else getattr(source, name) for name in cls.scalars()}
-        if read := source.__dict__.get("_read"):
-            return cls.lazy(scalars, len(source), lambda name, rows: (
-                changes[name][rows].copy() if name in changes else read(name, rows)
-            ))  # fmt: skip
-        columns = {name: changes[name] if name in changes else getattr(source, name) for name in cls.columns()}
-        return cls(**scalars, **columns)
-
     if not TYPE_CHECKING:  # so that type checkers still report names that no record has
 
         def __getattr__(self, name: str) -> Any:
@@ -120,24 +130,28 @@ class Record:
 
     def published(self) -> Iterator[Published]:
         """Yield the numbers of this record for results.json."""
-        return iter(())
+        for numbers in self.PUBLISHED:
+            prefix, _, names = numbers.partition(": ")
+            yield from self.publish(prefix, names)
 
-    def publish(self, prefix: str, *names: str, row: int | None = None, with_std: bool = False) -> Iterator[Published]:
-        """Yield scalars, or a row of columns, under `<prefix>.<name>`, with or without their standard errors."""
-        return (Published(f"{prefix}.{name}", name, f"{name}_std" if with_std else "", row) for name in names)
+    def publish(self, prefix: str, names: str) -> Iterator[Published]:
+        """Yield the numbers of an entry of `PUBLISHED`."""
+        scalars = {name: getattr(self, name) for name in self.scalars()}
+        is_by_row = any(word in prefix for word in ("{row}", "{name}", "{slug}"))
+        for row in range(len(self)) if is_by_row else (None,):
+            name = "" if row is None else self.row_name(row)
+            place = prefix.format(**scalars, row=(row or 0) + 1, name=name, slug=slug(name))
+            for text in names.split():
+                key, is_renamed, field = text.removesuffix("±").rpartition("=")
+                full_key = f"{place}.{key if is_renamed else field}".removesuffix(".")
+                yield Published(full_key, field, f"{field}_std" if text.endswith("±") else "", row)
 
     def row_name(self, row: int) -> str:
         """Return the name of a row, for tracing a number back to it."""
         return str(getattr(self, self.ROWS)[row]) if self.ROWS else str(row)
 
     def row_number(self, name: str) -> int:
-        """Return the row with a name.
-
-        Raises
-        ------
-        ValueError
-            If no row has that name.
-        """
+        """Return the row with a name; raises ValueError if no row has that name."""
         return [str(label) for label in getattr(self, self.ROWS)].index(name) if self.ROWS else int(name)
 
     def __post_init__(self) -> None:

@@ -1,16 +1,15 @@
 """Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-import numpy as np
-
-from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names, Published
+from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names
 
 
 @dataclass(frozen=True, eq=False)
 class LogSummary(LogRecord):
     """The summary of reading one log: its clock and rows, and the use of each channel."""
+
+    PUBLISHED = ("log.{log}: rows rate duration jitter longest_gap duplicates dropped",)
 
     role: str
     format: str
@@ -34,11 +33,6 @@ class LogSummary(LogRecord):
     nulls: Counts
     nans: Counts
 
-    def published(self) -> Iterator[Published]:
-        """The properties of the clock and the rows."""
-        names = ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped")
-        yield from self.publish(f"log.{self.log}", *names)
-
 
 @dataclass(frozen=True, eq=False)
 class Touch(LogRecord):
@@ -60,24 +54,8 @@ class Touch(LogRecord):
     z: Column
 
 
-def none_filled() -> Counts:
-    """Return the default flags of a `SampledRecord`: no sample is filled in."""
-    return np.zeros(0, np.int64)
-
-
-class SampledRecord(LogJointRecord):
-    """A record of samples, some of which may be `filled` in where they were missing."""
-
-    filled: Counts
-
-    def __post_init__(self) -> None:
-        if not np.any(self.filled):
-            object.__setattr__(self, "filled", np.zeros(len(self.t), np.int64))  # type: ignore[attr-defined]
-        super().__post_init__()
-
-
 @dataclass(frozen=True, eq=False)
-class Recording(SampledRecord):
+class Recording(LogJointRecord):
     """One joint during one log, as recorded: on the log's clock, in joint units."""
 
     role: str
@@ -87,11 +65,11 @@ class Recording(SampledRecord):
     q: Column
     dq: Column
     tau: Column
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(SampledRecord):
+class Signal(LogJointRecord):
     """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
 
     role: str
@@ -105,11 +83,11 @@ class Signal(SampledRecord):
     dq: Column
     tau: Column
     segment: Counts
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(SampledRecord):
+class Motion(LogJointRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
     The noise is what the filter removes.  The velocity `dq` is 0 where its sign is not known.  Where the joint stands
@@ -135,12 +113,17 @@ class Motion(SampledRecord):
     tau: Column
     segment: Counts
     standing: Counts
-    filled: Counts = field(default_factory=none_filled)
+    filled: Counts
 
 
 @dataclass(frozen=True, eq=False)
 class Average(LogJointRecord):
     """One period of a joint, averaged over the periods of a recording, with the spread between them."""
+
+    PUBLISHED = (
+        "period.{log}: =period± periods",
+        "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±",
+    )
 
     rate: float
     period: float
@@ -166,13 +149,6 @@ class Average(LogJointRecord):
     tau_var: Column
     tau_alternating: Column
     count: Counts
-
-    def published(self) -> Iterator[Published]:
-        """The period, which the joints of a log share, and the noise between periods."""
-        yield Published(f"period.{self.log}", "period", std="period_std")
-        yield Published(f"period.{self.log}.periods", "periods")
-        names = ("sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
-        yield from self.publish(f"noise.{self.log}.{self.joint}", *names, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,15 +76,11 @@ class Writer:
                 for place in self._open:
                     self._unnamed(self.folder / place).replace(self.folder / place)
         finally:
-            self._remove_partial()
-
-    def _remove_partial(self) -> None:
-        """Remove unfinished files; on a full disk, a file cannot even be closed."""
-        for place, file in self._open.items():
-            with suppress(OSError):
-                file.close()
-            file.is_open = False  # otherwise the garbage collector closes it again and prints an error
-            self._unnamed(self.folder / place).unlink(missing_ok=True)
+            for place, file in self._open.items():
+                with suppress(OSError):  # a full disk
+                    file.close()
+                file.is_open = False  # otherwise the garbage collector closes it again and prints an error
+                self._unnamed(self.folder / place).unlink(missing_ok=True)
 
     def _metadata(self, record: Record) -> dict[str, str]:
         units = {name: self.unit(record)(QUANTITIES[name].unit) for name in record.scalars()}

@@ -1,9 +1,8 @@
 """Records of the force at the tip, and of a force sensor that measures the same force."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, RobotRecord
+from davinci_forces.records.record import Column, Counts, Labels, LogRecord, RobotRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +36,10 @@ class TipForce(LogRecord):
     """
 
     UNKNOWN = ("f_x", "f_y", "f_z", "c_xx", "c_yy", "c_zz", "c_xy", "c_xz", "c_yz")
+    PUBLISHED = (
+        "tip.{log}: free_rms=force_rms± free_level=force_level± detection_level=force_detection± "
+        "coverage=force_coverage± condition=median_condition near_singular=near_share",
+    )
 
     role: str
     filter: str
@@ -72,14 +75,6 @@ class TipForce(LogRecord):
     condition: Column
     near_singular: Counts
 
-    def published(self) -> Iterator[Published]:
-        """The apparent force in free space, and the conditioning of the log's poses."""
-        for key, name in (("free_rms", "force_rms"), ("free_level", "force_level"),
-                          ("detection_level", "force_detection"), ("coverage", "force_coverage")):  # fmt: skip
-            yield Published(f"tip.{self.log}.{key}", name, std=f"{name}_std")
-        yield Published(f"tip.{self.log}.condition", "median_condition")
-        yield Published(f"tip.{self.log}.near_singular", "near_share")
-
 
 @dataclass(frozen=True, eq=False)
 class TipContact(LogRecord):
@@ -87,6 +82,8 @@ class TipContact(LogRecord):
 
     The windows that the study states come first, then other contacts detected on any joint.
     """
+
+    PUBLISHED = ("tip.{log}.{row}: f_x± f_y± f_z± peak=f_peak± sigma_1± sigma_2± sigma_3±",)
 
     filter: str
     stated: Counts
@@ -116,20 +113,13 @@ class TipContact(LogRecord):
     condition: Column
     near_singular: Counts
 
-    def published(self) -> Iterator[Published]:
-        """Every contact, numbered from 1."""
-        for i in range(len(self)):
-            prefix = f"tip.{self.log}.{i + 1}"
-            for key, name in (("f_x", "f_x"), ("f_y", "f_y"), ("f_z", "f_z"), ("peak", "f_peak")):
-                yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
-            yield from self.publish(prefix, "sigma_1", "sigma_2", "sigma_3", row=i, with_std=True)
-
 
 @dataclass(frozen=True, eq=False)
 class TipBudget(LogRecord):
     """The contribution of each joint's error to the tip force, at the median pose of one log's free space."""
 
     ROWS = "of_joint"
+    PUBLISHED = ("tip.{log}.{name}: filter_part=filter_force model_part=model_force± total=total_force±",)
 
     of_joint: Labels
     lever: Column
@@ -138,14 +128,6 @@ class TipBudget(LogRecord):
     model_force_std: Column
     total_force: Column
     total_force_std: Column
-
-    def published(self) -> Iterator[Published]:
-        """The parts of every joint."""
-        for i, joint in enumerate(self.of_joint):
-            prefix = f"tip.{self.log}.{joint}"
-            yield Published(f"{prefix}.filter_part", "filter_force", row=i)
-            for key, name in (("model_part", "model_force"), ("total", "total_force")):
-                yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +140,10 @@ class SensorForce(LogRecord):
 
     KEY = ("log", "axis")
     UNKNOWN = ("measured_force", "estimated_force", "estimated_force_std")
+    PUBLISHED = (
+        "sensor.{log}.{axis}: rmse=force_error± bias=force_bias± relative_error=force_relative_error± "
+        "largest=force_error_max± lag=sensor_lag± coverage=sensor_coverage± range=force_range",
+    )
 
     axis: str
     role: str
@@ -179,12 +165,3 @@ class SensorForce(LogRecord):
     measured_force: Column
     estimated_force: Column
     estimated_force_std: Column
-
-    def published(self) -> Iterator[Published]:
-        """Error, bias, range, lag and coverage."""
-        prefix = f"sensor.{self.log}.{self.axis}"
-        for key, name in (("rmse", "force_error"), ("bias", "force_bias"), ("relative_error", "force_relative_error"),
-                          ("largest", "force_error_max"), ("lag", "sensor_lag"),
-                          ("coverage", "sensor_coverage")):  # fmt: skip
-            yield Published(f"{prefix}.{key}", name, std=f"{name}_std")
-        yield Published(f"{prefix}.range", "force_range")

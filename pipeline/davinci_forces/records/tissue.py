@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord, slug
+from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord
 
 MAX_LISTED_PUSHES = 20  # up to this number of pushes in a log, results.json has each push
 
@@ -80,13 +80,10 @@ class Stiffness(LogRecord):
 
     def published(self) -> Iterator[Published]:
         """The median and quartiles over the pushes used, the number of these pushes, and each push if there are few."""
-        prefix = f"tissue.{self.log}"
-        yield from self.publish(prefix, "stiffness", "stiffness_q1", "stiffness_q3", with_std=True)
-        yield from self.publish(prefix, "pushes")
-        for i in range(len(self) if len(self) <= MAX_LISTED_PUSHES else 0):
-            key = f"{prefix}.{self.push[i]}"
-            names = ("k_t", "k_t_loading", "k_t_unloading", "r2", "lost", "lost_share", "onset", "onset_depth")
-            yield from self.publish(key, *names, row=i, with_std=True)
+        yield from self.publish("tissue.{log}", "stiffness± stiffness_q1± stiffness_q3± pushes")
+        if len(self) <= MAX_LISTED_PUSHES:
+            names = "k_t± k_t_loading± k_t_unloading± r2± lost± lost_share± onset± onset_depth±"
+            yield from self.publish("tissue.{log}.{name}", names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +91,7 @@ class TissueModel(LogRecord):
     """The models of tissue for one log, and the one with the best prediction of left-out pushes."""
 
     ROWS = "law"
+    PUBLISHED = ("tissue.{log}.{slug}: error± tangent± damping± exponent±",)
 
     chosen: str
     why: str
@@ -107,12 +105,6 @@ class TissueModel(LogRecord):
     damping_std: Column
     exponent: Column
     exponent_std: Column
-
-    def published(self) -> Iterator[Published]:
-        """The error and the properties of each model."""
-        for i, name in enumerate(self.law):
-            prefix = f"tissue.{self.log}.{slug(str(name))}"
-            yield from self.publish(prefix, "error", "tangent", "damping", "exponent", row=i, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +159,7 @@ class HandLimit(Record):
         """The hand and its limits, the headline and the filter with their errors."""
         measured = [name.removesuffix("_std") for name in self.scalars() if name.endswith("_std")]
         names = [name for name in self.scalars() if name != "hand" and name.removesuffix("_std") not in measured]
-        yield from self.publish(f"stability.{self.hand}", *names)
-        yield from self.publish(f"stability.{self.hand}", *measured, with_std=True)
+        return self.publish("stability.{hand}", " ".join((*names, *(f"{name}±" for name in measured))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +180,8 @@ class HapticMotion(RobotRecord):
 class HapticResponse(RobotRecord):
     """The response of the felt force to the motion of a hand in the tissue, over frequency."""
 
+    PUBLISHED = ("haptics: tissue_stiffness at_frequency rendered_stiffness transparency felt_delay",)
+
     arm_from: str
     tissue_stiffness: float
     at_frequency: float
@@ -199,17 +192,13 @@ class HapticResponse(RobotRecord):
     felt_share: Column
     felt_late: Column
 
-    def published(self) -> Iterator[Published]:
-        """The true and the felt stiffness of the tissue."""
-        names = ("tissue_stiffness", "at_frequency", "rendered_stiffness", "transparency", "felt_delay")
-        yield from self.publish("haptics", *names)
-
 
 @dataclass(frozen=True, eq=False)
 class HapticRun(Record):
     """One hand that moves in and out of the tissue, and its felt force.  Fig 8.12"""
 
     KEY = ("hand",)
+    PUBLISHED = ("haptics.{hand}: out_of_reach true_peak felt_peak felt_error",)
 
     hand: str
     out_of_reach: int
@@ -222,7 +211,3 @@ class HapticRun(Record):
     arm_x: Column
     true_force: Column
     felt_force: Column
-
-    def published(self) -> Iterator[Published]:
-        """The forces."""
-        yield from self.publish(f"haptics.{self.hand}", "out_of_reach", "true_peak", "felt_peak", "felt_error")

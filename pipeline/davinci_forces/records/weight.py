@@ -1,9 +1,8 @@
 """Records of masses on the arm."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRecord, Published
+from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +33,12 @@ class Weight(LogRecord):
     """The mass on the arm in one log, from the external effort of the joints that it loads."""
 
     ROWS = "loaded"
+    PUBLISHED = (
+        "weight.{log}: mass± mass_mirrored± scale=mass_scale± tare_mass± run_std fit_std widening agreement "
+        "agreement_mirrored birge_ratio",
+        "weight.{log}.{name}: mass=mass_alone± mass_mirrored=mirrored_alone± false_mass joint_offset± left_rms± "
+        "free_error±",
+    )
 
     moves_with: str
     tare: str  # the log that was subtracted
@@ -68,34 +73,17 @@ class Weight(LogRecord):
     free_error: Column
     free_error_std: Column
 
-    def published(self) -> Iterator[Published]:
-        """The mass on the stated side and on the opposite one, the scale, and the mass of the tare."""
-        for key, field in (("mass", "mass"), ("mass_mirrored", "mass_mirrored"), ("scale", "mass_scale")):
-            yield Published(f"weight.{self.log}.{key}", field, std=f"{field}_std")
-        yield from self.publish(f"weight.{self.log}", "tare_mass", with_std=True)
-        yield from self.publish(
-            f"weight.{self.log}", "run_std", "fit_std", "widening", "agreement", "agreement_mirrored", "birge_ratio"
-        )
-        for i, joint in enumerate(self.loaded):
-            prefix = f"weight.{self.log}.{joint}"
-            yield Published(f"{prefix}.mass", "mass_alone", std="mass_alone_std", row=i)
-            yield Published(f"{prefix}.mass_mirrored", "mirrored_alone", std="mirrored_alone_std", row=i)
-            yield from self.publish(prefix, "false_mass", row=i)
-            yield from self.publish(prefix, "joint_offset", "left_rms", "free_error", row=i, with_std=True)
-
 
 @dataclass(frozen=True, eq=False)
 class TorqueConstant(LogJointRecord):
     """The torque constant of a joint's motor that a known mass gives; a proposal, which no stage applies."""
 
+    PUBLISHED = ("weight.{log}.{joint}: torque_constant±",)
+
     stated_mass: float
     torque_constant_used: float  # NaN where the effort is in A
     torque_constant: float
     torque_constant_std: float
-
-    def published(self) -> Iterator[Published]:
-        """The proposed constant."""
-        yield from self.publish(f"weight.{self.log}.{self.joint}", "torque_constant", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +91,9 @@ class FreeWeight(LogRecord):
     """The apparent mass on the arm in a log of free motion, where it should be 0."""
 
     KEY = ("log", "weight")
+    PUBLISHED = ("weight.{weight}.free.{log}: =free_mass±",)
 
     weight: str
     role: str
     free_mass: float
     free_mass_std: float
-
-    def published(self) -> Iterator[Published]:
-        """The mass that should be 0."""
-        yield Published(f"weight.{self.weight}.free.{self.log}", "free_mass", std="free_mass_std")

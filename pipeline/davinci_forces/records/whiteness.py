@@ -41,15 +41,12 @@ class Whiteness(LogJointRecord):
     def published(self) -> Iterator[Published]:
         """The tests; those of innovations are among the filter's numbers."""
         if not self.signal.startswith("innovation_"):
-            prefix = f"whiteness.{self.log}.{self.joint}.{self.signal}"
-            yield from self.publish(prefix, "acf1", "skewness", "kurtosis", with_std=True)
-            yield from self.publish(prefix, "ljung_box_p", "jarque_bera_p", "white")
-            return
-        prefix, signal = f"ekf.{self.log}.{self.joint}", self.signal.removeprefix("innovation_")
-        yield Published(f"{prefix}.acf1_{signal}", "acf1", "acf1_std")
-        for name in ("ljung_box_p", "periodogram_p", "jarque_bera_p"):
-            yield Published(f"{prefix}.{name}_{signal}", name)
-        yield Published(f"{prefix}.white", "all_white")
+            tests = "acf1± skewness± kurtosis± ljung_box_p jarque_bera_p white"
+            return self.publish("whiteness.{log}.{joint}.{signal}", tests)
+        signal = self.signal.removeprefix("innovation_")
+        names = ("acf1", "ljung_box_p", "periodogram_p", "jarque_bera_p")
+        tests = " ".join(f"{name}_{signal}={name}" for name in names).replace("=acf1", "=acf1±")
+        return self.publish("ekf.{log}.{joint}", f"{tests} white=all_white")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +70,7 @@ class Innovation(LogJointRecord):
 
     def published(self) -> Iterator[Published]:
         """The normalised square of this innovation alone."""
-        key = f"ekf.{self.log}.{self.joint}.nis_{self.signal.removeprefix('innovation_')}"
-        yield Published(key, "nis_own", "nis_own_std")
+        return self.publish("ekf.{log}.{joint}", f"nis_{self.signal.removeprefix('innovation_')}=nis_own±")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,4 +95,4 @@ class Explanation(LogJointRecord):
     def published(self) -> Iterator[Published]:
         """The error of the sample times, where other joints determine it."""
         if self.clock_std > 0.0:
-            yield from self.publish(f"ekf.{self.log}.{self.joint}", "clock_std")
+            yield from self.publish("ekf.{log}.{joint}", "clock_std")

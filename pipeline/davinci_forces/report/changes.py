@@ -7,21 +7,10 @@ from dataclasses import dataclass
 SUBJECTS = {  # what a key is about, by its first part; other keys are of the study
     "model": ("fit", "choice", "cv", "predict", "path", "search", "guess", "identifiability", "correlation", "truth"),
     "contacts": ("contact", "tissue", "weight"),
-    "forces": (
-        "effort",
-        "tip",
-        "ekf",
-        "threshold",
-        "tuning",
-        "direct",
-        "momentum",
-        "rate",
-        "rts",
-        "stability",
-        "haptics",
-    ),
+    "forces": ("effort", "tip", "ekf", "threshold", "tuning", "direct", "momentum", "rate", "rts", "stability",
+               "haptics"),
     "noise": ("noise", "whiteness", "band", "period", "log"),
-}
+}  # fmt: skip
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
 

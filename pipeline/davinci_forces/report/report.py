@@ -34,33 +34,20 @@ def write_report(
     report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
     edition = f"report ID {report_id} · davinci-forces {provenance.version}, code {provenance.code}{dates(catalogue)}"
     rated = Rated(results, report_id, tuple(log.name for log in study.logs), ratings)
-    documents = tuple(
-        Document(
-            title,
-            study.title,
-            study.simulated,
-            content,
-            edition,
-            name,
-            links_beside(name, built),
-            rated=rated if name == "report" else None,
-        )
-        for name, (title, content) in built.items()
-        if content
-    )
-    return render_all(documents) | numbers | {MANIFEST: listed, "references.bib": bibliography().encode()}
+    documents = []
+    for name, (title, content) in built.items():
+        others = [(heading, f"{other}.html") for other, (heading, parts) in built.items() if parts and other != name]
+        links = (*others, ("Numbers", "results.json"))
+        asked = rated if name == "report" else None
+        if content:
+            documents.append(Document(title, study.title, study.simulated, content, edition, name, links, rated=asked))
+    return render_all(tuple(documents)) | numbers | {MANIFEST: listed, "references.bib": bibliography().encode()}
 
 
 def dates(catalogue: Catalogue) -> str:
     """The dates of the data, as the logs give them; "" if none does."""
     days = sorted(summary.started[:10] for summary in catalogue.records(LogSummary) if summary.started)
     return f" · data of {' to '.join(dict.fromkeys((days[0], days[-1])))}" if days else ""
-
-
-def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:
-    """The other documents of a report, by their titles, and its numbers."""
-    others = [(title, f"{other}.html") for other, (title, content) in built.items() if content and other != name]
-    return (*others, ("Numbers", "results.json"))
 
 
 def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:

@@ -97,7 +97,7 @@ def collect(catalogue: Catalogue) -> Results:
     """Every number that a study's records publish."""
     results = Results()
     for kind in KINDS.values():
-        if kind.published is Record.published:  # it has none, and may be large
+        if not kind.PUBLISHED and kind.published is Record.published:  # it has none, and may be large
             continue
         for record in catalogue.records(kind):
             for number in record.published():

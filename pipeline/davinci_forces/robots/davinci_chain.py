@@ -70,16 +70,11 @@ BOX = {
 AXIS_INDEX = {"x": X, "y": Y, "z": Z}
 
 
-def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The links as uniform cylinders in the frames of the dynamics.
+def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
+    """The links as uniform cylinders in the frames of Table 3.1, as Tables 4.1 and 4.2 state them.
 
     The centre of the instrument holder is `lc5` [m] from the origin of its frame.
     """
-    return in_table_frames(lc5).in_frames(CHAIN.of_links)
-
-
-def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The same bodies in the frames of Table 3.1, as Tables 4.1 and 4.2 state them."""
     centres = np.zeros((len(CYLINDERS), 3))
     for centre, (*_, axis, distance) in zip(centres, CYLINDERS, strict=True):
         centre[axis] = distance
@@ -90,9 +85,7 @@ def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
     return Bodies(np.array([body[0] for body in CYLINDERS]), centres, np.array(inertias), counts_from)
 
 
-BODIES = bodies()
-
-
+BODIES = in_table_frames().in_frames(CHAIN.of_links)  # in the frames of the dynamics
 GUESSED = in_table_frames(GUESSED_LC5)
 
 

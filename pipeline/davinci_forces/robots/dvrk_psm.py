@@ -52,17 +52,8 @@ ROBOT = Robot(
     name="dvrk_psm",
     title="da Vinci Research Kit, patient-side manipulator",
     joints=tuple(
-        replace(
-            joint,
-            limits=replace(joint.limits, q=q),
-            gear_ratio=1.0,
-            torque_constant=1.0,
-            harmonics=HARMONICS,
-            published=(),
-            physical=None,
-            printed=None,
-        )
-        for joint, q in zip(davinci.ROBOT.joints, POSITIONS, strict=True)
+        replace(joint, limits=replace(joint.limits, q=q), gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS)
+        for joint, q in zip((davinci.ROLL, davinci.PITCH, davinci.INSERTION), POSITIONS, strict=True)
     ),
     chain=PSM_CHAIN,
     wrist=("instrument_roll", "instrument_pitch", "instrument_yaw"),

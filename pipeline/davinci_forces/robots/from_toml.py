@@ -145,21 +145,20 @@ def _not_zero(table: TomlTable, key: str, default: float) -> float:
 
 def _limits(table: TomlTable) -> Limits:
     limits = table.table("limits")
-    pairs = [limits.take(name, [*ANYWHERE], (list,), "[lower, upper]", _are_bounds) for name in ("q", "dq", "ddq")]
+
+    def are_bounds(pair: list[Any]) -> bool:
+        return len(pair) == 2 and all(is_number(x) or x in ANYWHERE for x in pair) and pair[0] < pair[1]
+
+    pairs = [limits.take(name, [*ANYWHERE], (list,), "[lower, upper]", are_bounds) for name in ("q", "dq", "ddq")]
     for name, pair in zip(("q", "dq", "ddq"), pairs, strict=True):
         limits.likely(name, (end for end in pair if end not in ANYWHERE))
     q, dq, ddq = ((float(low), float(high)) for low, high in pairs)
     changed = Limits(q, dq, ddq)
     if "effort" in limits:
-        changed = replace(
-            changed, effort=limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
-        )
+        effort = limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
+        changed = replace(changed, effort=effort)
     limits.close()
     return changed
-
-
-def _are_bounds(pair: list[Any]) -> bool:
-    return len(pair) == 2 and all(is_number(x) or x in ANYWHERE for x in pair) and pair[0] < pair[1]
 
 
 class Geometry(NamedTuple):

@@ -2,9 +2,10 @@
 
 import atexit
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import typer
@@ -80,6 +81,14 @@ def echo(text: str, err: bool = False, **style: Any) -> None:
     with suppress(LookupError):
         text = text.encode(encoding, "replace").decode(encoding)
     typer.secho(text, err=err, **style)
+
+
+def table(rows: Sequence[Sequence[str]], right_from: int = sys.maxsize) -> Iterator[str]:
+    """Lay out the rows of a table as lines; columns from a number on, from 0, are aligned right."""
+    widths = [max(map(len, column)) for column in zip_longest(*rows, fillvalue="")]
+    for row in rows:
+        cells = (f"{cell:{'>' if i >= right_from else '<'}{widths[i]}}" for i, cell in enumerate(row))
+        yield "  ".join(cells).rstrip()
 
 
 def show_markdown(text: str) -> None:

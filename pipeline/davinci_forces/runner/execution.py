@@ -14,7 +14,7 @@ from typing import Any
 from davinci_forces.errors import BadLog, PipelineError
 from davinci_forces.files import digest
 from davinci_forces.logs.joined import open_joined
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.log import Log
 from davinci_forces.logs.parts import open_parts
 from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic, store
@@ -154,9 +154,8 @@ def _log(folders: Folders, entry: LogEntry) -> Log:
     if missing:
         names = ", ".join(map(repr, missing))
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
-    options = Options(entry.delimiter, entry.decimal, entry.header, entry.encoding, entry.dtype, entry.columns)
     files = [folders.raw / file for file in entry.files]
-    return open_joined(files, options) if entry.join else open_parts(files, options)
+    return open_joined(files, entry.options) if entry.join else open_parts(files, entry.options)
 
 
 def _messages(record: Record) -> list[str]:

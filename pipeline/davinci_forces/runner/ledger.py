@@ -1,4 +1,4 @@
-"""The record of what each result was made from: one small JSON file per task, and an index of all these files.
+"""The record of what each result was made from: one small JSON file per task.
 
 A task is up to date while its fingerprint and the content of its outputs agree with its entry.  The fingerprint covers
 inputs by content, settings, robot, declarations of records, code and version.  Comparing an old entry with a new
@@ -6,17 +6,13 @@ fingerprint gives the reason to run.
 
 A study may come from somebody else, and files that an entry names may be removed.  So an entry is valid only in its own
 place, and only if it names files of the report and records of present or former kinds.
-
-The index holds all entries in one file, so that a run with nothing to do reads one file and not thousands.  The first
-change of an entry removes it, and a run that ends writes it.  If an entry is newer or missing, all are read one by one.
-The index need not be trusted: a task is up to date only if its files agree with its entry, and `verify` reads entries.
 """
 
 import json
 import os
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,10 +27,9 @@ from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differen
 
 MAX_NAME_BYTES = 200  # in a file's name, which may have 255 bytes with all endings
 SEAL = ',\n "seal": "{}"\n}}\n'  # the end of an entry
-INDEX = "index.json"
+INDEX = "index.json"  # of all entries, which earlier versions wrote
 UNREADABLE = OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError  # raised by foreign JSON
 PARTS = "inputs", "given", "settings", "schemas", "code"  # of a fingerprint, that are tables
-SHARED = "code", "schemas", "settings"  # parts of a fingerprint that many tasks share
 FOLDERS = "|".join((*(kind.folder() for kind in KINDS.values()), *FORMER_FOLDERS))
 RECORD = rf"processed/(?:{FOLDERS})/(?:(?!\.\.?/)[^/\\:\0]+/)?[^/\\:\0]+\.parquet"
 OUTPUT = re.compile(f"{RECORD}|reports/(?:{'|'.join(map(re.escape, FILES))})")
@@ -74,17 +69,13 @@ class Entry:
 
 
 class Ledger:
-    """The entries of one study; a run reads the entries, and hashes each file, once.
+    """The entries of one study; a run reads the entries, and hashes each file, once."""
 
-    Entries are read from their index if that is complete, or else, or with `one_by_one`, from their files.
-    """
-
-    def __init__(self, folders: Folders, one_by_one: bool = False) -> None:
+    def __init__(self, folders: Folders) -> None:
         self.folders = folders
         self._digests: dict[str, str] = {}
         self.changes: list[tuple[Iterable[str], Iterable[str]]] = []  # removed and added files, one pair per entry
         self.home = folders.processed / "tasks"
-        self._one_by_one, self._indexed = one_by_one, False
         self._void: dict[str, str] = {}  # file that is not a valid entry -> reason
 
     def place(self, stage: str, task: str) -> Path:
@@ -93,17 +84,10 @@ class Ledger:
 
     @cached_property
     def _entries(self) -> dict[str, dict[str, Entry]]:
-        indexed = {} if self._one_by_one else read_index(self.home, list(self._files()))
-        with suppress(*UNREADABLE):
-            entries = {s: {n: check(Entry(**e), s, n) for n, e in named.items()} for s, named in indexed.items()}
-            self._indexed = bool(entries)
-            return entries or self._read_one_by_one()
-        return self._read_one_by_one()
-
-    def _read_one_by_one(self) -> dict[str, dict[str, Entry]]:
         entries: dict[str, dict[str, Entry]] = {}
         shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
-        for stage, name, file in self._files():
+        for place in sorted(glob("*/*.json", root_dir=self.home)):  # paths would take as long as hashing the outputs
+            file = f"{self.home}{os.sep}{place}"
             try:
                 entry = _read(file)
             except UNREADABLE as error:
@@ -112,13 +96,8 @@ class Ledger:
             # All tasks of a stage share its code, the largest part of an entry.
             code = entry.fingerprint["code"]
             entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
-            entries.setdefault(stage, {})[name] = entry
+            entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         return entries
-
-    def _files(self) -> Iterator[tuple[str, str, str]]:
-        """Stage, task and file of every entry; as text, since paths would take as long as hashing the outputs."""
-        for name in sorted(glob("*/*.json", root_dir=self.home)):
-            yield os.path.dirname(name), os.path.basename(name).removesuffix(".json"), f"{self.home}{os.sep}{name}"
 
     def entry(self, stage: str, task: str) -> Entry | None:
         """The entry of a task, or None if the task has not run or its entry is not valid."""
@@ -144,7 +123,6 @@ class Ledger:
         self._outputs.update([*entry.outputs])
         removed = self._remove_outputs(before.outputs if before else ())
         self._digests.update(entry.outputs)
-        self._forget_index()
         write_bytes(self.place(entry.stage, entry.task), seal(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         self.changes.append((removed, entry.outputs))
@@ -155,7 +133,6 @@ class Ledger:
 
     def remove(self, entry: Entry) -> None:
         """Remove the entry and the outputs of a task, and the folders that this leaves empty."""
-        self._forget_index()
         self.changes.append((self._remove_outputs(entry.outputs), ()))
         self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
         self._unlink(f"processed/tasks/{entry.stage}/{file_name(entry.task)}.json")
@@ -183,22 +160,6 @@ class Ledger:
             with suppress(OSError):  # a folder that is not empty stays
                 for folder in list(file.parents)[: len(parts) - 1]:
                     folder.rmdir()
-
-    def write_index(self) -> None:
-        """Write the index of all entries, unless the file exists."""
-        if self._entries and not self._indexed:
-            write_bytes(self.home / INDEX, self.index())
-            self._indexed = True
-
-    def index(self) -> bytes:
-        """The content of the index of all entries."""
-        return index_of({s: {n: vars(e) for n, e in named.items()} for s, named in self._entries.items()})
-
-    def _forget_index(self) -> None:
-        """Remove the index before an entry changes."""
-        if self._indexed or not self.changes:
-            self.home.joinpath(INDEX).unlink(missing_ok=True)
-            self._indexed = False
 
     def digest(self, name: str) -> str:
         """The hash of a file, computed once a run; "" if there is no file."""
@@ -232,12 +193,6 @@ def seal(entry: Entry) -> str:
     return text.removesuffix("\n}") + SEAL.format(hash_of_text(text))
 
 
-def unseal(text: str) -> Entry | None:
-    """The entry of a text, or None if its hash is wrong."""
-    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
-    return Entry(**json.loads(content)) if text.endswith(SEAL.format(hash_of_text(content))) else None
-
-
 def check(entry: Entry, stage: str, name: str) -> Entry:
     """Check that a run would write this entry under this stage and name, and return it.
 
@@ -267,10 +222,15 @@ def check(entry: Entry, stage: str, name: str) -> Entry:
 
 def _read(file: str) -> Entry:
     """Read the entry in a file; raises as `check` does, and if the file cannot be read or its hash is wrong."""
-    entry = unseal(read_bytes(file).decode())
-    if entry is None:
+    text = read_bytes(file).decode()
+    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
+    if not text.endswith(SEAL.format(hash_of_text(content))):
         raise ValueError("it is not as a stage wrote it")
-    return check(entry, os.path.basename(os.path.dirname(file)), os.path.basename(file).removesuffix(".json"))
+    return check(
+        Entry(**json.loads(content)),
+        os.path.basename(os.path.dirname(file)),
+        os.path.basename(file).removesuffix(".json"),
+    )
 
 
 def _digest(file: str) -> str:
@@ -280,49 +240,3 @@ def _digest(file: str) -> str:
         if os.path.isfile(file):
             raise
         return ""
-
-
-Entries = dict[str, dict[str, dict[str, Any]]]  # by stage, and by the name of the entry's file
-
-
-def read_index(folder: Path, files: Collection[tuple[str, str, str]]) -> Entries:
-    """The entries of these stages, names and files; none unless the index is intact, newer, and of exactly these."""
-    try:
-        written = os.stat(folder / INDEX).st_mtime_ns
-        if any(os.stat(file).st_mtime_ns > written for *_, file in files):
-            return {}
-        content = _unsealed(read_bytes(folder / INDEX).decode())
-        entries: Entries = content["entries"]
-        if {(stage, name) for stage, named in entries.items() for name in named} != {file[:2] for file in files}:
-            return {}
-        for entry in (entry for named in entries.values() for entry in named.values()):
-            entry["fingerprint"] |= {part: content["shared"][i] for part, i in entry.pop("shared").items()}
-    except UNREADABLE:
-        return {}
-    return entries
-
-
-def index_of(entries: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> bytes:
-    """The content of the index of these entries; `read_index` reads it."""
-    numbers: dict[str, int] = {}  # numbers of the shared parts, by their text
-    brief: Entries = {}
-    for stage, named in sorted(entries.items()):
-        for name, entry in sorted(named.items()):
-            unshared = {part: value for part, value in entry["fingerprint"].items() if part not in SHARED}
-            texts = {part: _text(entry["fingerprint"][part]) for part in SHARED if part in entry["fingerprint"]}
-            shared = {part: numbers.setdefault(text, len(numbers)) for part, text in texts.items()}
-            brief.setdefault(stage, {})[name] = {**entry, "fingerprint": unshared, "shared": shared}
-    text = _text({"entries": brief, "shared": list(map(json.loads, numbers))})
-    return f"{hash_of_text(text)}\n{text}".encode()
-
-
-def _unsealed(text: str) -> Any:
-    """Parse the text of an index, whose first line is the hash of the following lines."""
-    sha, _, content = text.partition("\n")
-    if sha != hash_of_text(content):
-        raise ValueError("not as it was written")
-    return json.loads(content)
-
-
-def _text(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

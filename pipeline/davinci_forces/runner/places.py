@@ -55,7 +55,7 @@ class Places:
         """
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
-            of_joint = joint if is_about_joint(kind) else ANY
+            of_joint = joint if {"joint", "group"} & {*kind.KEY} else ANY
             located += tuple(
                 self._sorted(kind, [log], of_joint) if log and is_about_log(kind) else self._of_all(kind, of_joint)
             )
@@ -91,8 +91,3 @@ def log_and_joint(kind: type[Record], name: str) -> tuple[str, str]:
 def is_about_log(kind: type[Record]) -> bool:
     """Whether every record of a kind is about one log."""
     return "log" in kind.KEY
-
-
-def is_about_joint(kind: type[Record]) -> bool:
-    """Whether every record of a kind is about one joint, or about the group that a model describes."""
-    return "joint" in kind.KEY or "group" in kind.KEY

@@ -82,7 +82,8 @@ class Plan:
         for kind, place in places.find(kinds, of_log):
             log, joint = log_and_joint(KINDS[kind], place)
             others = {p: places.find(k, log, joint) for p, k in (asks.optional | asks.every).items()}
-            name = _task_name(kind, place, len(kinds))
+            name = place.removesuffix(".parquet").partition("/")[2]
+            name = f"{KINDS[kind].folder()}/{name}" if len(kinds) > 1 else name
             yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
 
     def _each_log(self, asks: Declaration, places: Places, logs: Iterable[str]) -> Iterator[Task]:
@@ -137,11 +138,6 @@ def log_of(asks: Declaration, task: str) -> str:
         names = task.split("/")[len(kinds) > 1 :]
         return names[0] if all(map(is_about_log, kinds)) else ""
     return task if asks.per_log or "log" in asks.given.values() else ""
-
-
-def _task_name(kind: str, place: str, kinds: int) -> str:
-    name = place.removesuffix(".parquet").partition("/")[2]
-    return f"{KINDS[kind].folder()}/{name}" if kinds > 1 else name
 
 
 def reuse(ledger: Ledger, task: Task) -> str:

@@ -33,9 +33,11 @@ def task(plan: Plan) -> Task:
     study, ledger = plan.study, plan.ledger
     located = plan.places().find(tuple(KINDS.values()))
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
+    reviewed = study.folder / review.FILE  # the page depends on it, the report ID does not
+    review_hash = {"review": digest(reviewed)} if reviewed.is_file() else {}
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
-        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)},
+        given={"study": hash_of(replace(study, folder=Path(study.name)))} | review_hash,
         settings=asdict(study.settings),
         schemas={},
         code=code("davinci_forces.report.report", "davinci_forces.records.store")
@@ -63,13 +65,7 @@ def perform(ledger: Ledger, task: Task) -> Outcome:
 
 
 def render(ledger: Ledger, task: Task) -> dict[str, bytes]:
-    """The content of the report's files, by name.
-
-    Raises
-    ------
-    BadRecord
-        If a record cannot be read.
-    """
+    """The content of the report's files, by name; raises BadRecord if a record cannot be read."""
     from davinci_forces.report.report import write_report  # importing its plotting library takes longer than most runs
 
     study, located = task.given["study"], task.records["records"]
@@ -81,12 +77,6 @@ def ratings(study: Study) -> tuple[Rating, ...]:
     """The reviewers' ratings of the study's report, if its folder holds any."""
     file = study.folder / review.FILE
     return review.read(file) if file.exists() else ()
-
-
-def review_given(study: Study) -> dict[str, str]:
-    """The hash of the review: the page depends on it, the report ID does not."""
-    file = study.folder / review.FILE
-    return {"review": digest(file)} if file.is_file() else {}
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:

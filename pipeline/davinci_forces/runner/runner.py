@@ -14,7 +14,7 @@ from davinci_forces.runner import reporting
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.execution import Outcome, perform
 from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, goes_by_log, required_steps, stages_of
-from davinci_forces.runner.ledger import Entry, Folders, Ledger, file_name
+from davinci_forces.runner.ledger import INDEX, Entry, Folders, Ledger, file_name
 from davinci_forces.runner.lock import hold_lock
 from davinci_forces.runner.plan import Plan, Task, log_of, reuse
 from davinci_forces.runner.processes.workers import TaskQueue, WorkerPool
@@ -72,12 +72,11 @@ class Runner:
         ):
             if self.writable:
                 self._remove_leftovers()
+                self.ledger.home.joinpath(INDEX).unlink(missing_ok=True)
                 for file, reason in self.ledger.invalid_files().items():
                     self.console.warn(f"{file} is ignored, and the files it names are kept: {reason}")
                 self._remove_obsolete(steps)
             self._run(Graph(steps, [entry.name for entry in self.study.logs]))
-            if self.writable:
-                self.ledger.write_index()
         return self.failures == 0
 
     def preview(self, names: Iterable[str]) -> Iterator[str]:

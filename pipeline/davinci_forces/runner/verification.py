@@ -16,7 +16,7 @@ from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import reporting
 from davinci_forces.runner.execution import error_message
 from davinci_forces.runner.graph import every_step
-from davinci_forces.runner.ledger import INDEX, Folders, Ledger, file_name
+from davinci_forces.runner.ledger import Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study, review
@@ -24,9 +24,11 @@ from davinci_forces.study import Study, review
 MAX_NAMES = 5  # names of files or tasks in one message
 PAGES = ".html", ".pdf"
 ENTRY = re.compile(r"processed/tasks/[^./][^/]*/[^./][^/]*\.json")  # files that a ledger reads
-# Files that systems leave in any folder, the lock of a run, and the mark by which workers of a cluster know a folder.
+# Files that systems leave in any folder, the lock of a run, the mark by which workers of a cluster know a folder, and
+# the index of entries that earlier versions wrote.
 IGNORED = re.compile(
     r"(.*/)?(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*)|processed/\.(lock(-[0-9a-f]+)?(/.*)?|run-[0-9a-f]{12})"
+    r"|processed/tasks/index\.json"
 )
 
 
@@ -52,13 +54,13 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     NotReproduced
         With all differences, one per line.
     """
-    ledger = Ledger(folders, one_by_one=True)
+    ledger = Ledger(folders)
     recorded = known_files(ledger)
     problems = [f"{file} was altered: {reason}" for file, reason in ledger.invalid_files().items()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} has no results; run `davinci-forces all {folders.raw}` first")
     strays, unrelated = unknown_files(folders, recorded)
-    problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *strays]
+    problems += [*altered_files(folders, ledger, recorded), *strays]
     plan = Plan(study, ledger)
     report = reporting.task(plan)
     problems += differences_from_plan(plan, report)
@@ -90,13 +92,6 @@ def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
     return recorded
 
 
-def altered_index(ledger: Ledger) -> Iterator[str]:
-    """Report an index that does not agree with the entries."""
-    file = ledger.home / INDEX
-    if os.path.lexists(file) and not _has_content(file, ledger.index()):
-        yield f"{file} does not agree with the entries beside it; remove it, and the next run writes it again"
-
-
 def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str, str]]) -> Iterator[str]:
     """Report files that changed since a task read or made them."""
     for name, hashes in sorted(recorded.items()):
@@ -115,7 +110,7 @@ def unknown_files(folders: Folders, recorded: Iterable[str]) -> tuple[list[str],
     """Problems with links and unknown files among the results, and the unrelated files: those of the system, and
     those in raw/ that no stage read.
     """
-    paths = {*recorded, f"processed/tasks/{INDEX}", f"raw/{review.FILE}"}
+    paths = {*recorded, f"raw/{review.FILE}"}
     problems: list[str] = []
     unrelated: list[str] = []
     for root in ("processed", "reports", "raw"):

@@ -44,17 +44,18 @@ class SimulatedRun:
 
 
 def simulate_log(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """Simulate one recording: the whole arm in closed loop, or joint by joint; raises as `_in_closed_loop` does."""
-    return _in_closed_loop(scenario, log) if scenario.arm else _prescribed(scenario, log)
+    """Simulate one recording: the whole arm in closed loop, or joints that follow their trajectories exactly.
 
-
-def _prescribed(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """Compute the efforts of joints that follow their trajectories exactly, by inverse dynamics.  Section 6.1"""
+    Raises as `_in_closed_loop` does.
+    """
+    if scenario.arm:
+        return _in_closed_loop(scenario, log)
     t = np.arange(round(log.duration * scenario.rate)) / scenario.rate
     return SimulatedRun(t, {name: _joint_motion(scenario, log, name, t) for name in log.joints})
 
 
 def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> SimulatedMotion:
+    """The effort of a joint that follows its trajectory exactly, by inverse dynamics.  Section 6.1"""
     simulated, move = scenario.joints[name], log.moves.get(name)
     if isinstance(move, Fourier):
         q, dq, ddq = motion(move, t)
@@ -87,13 +88,11 @@ def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     clock = Timing(simulated_arm.tick, ticks)
     instants = np.arange(len(t) * ticks, dtype=np.float64) * simulated_arm.tick - log.lead
     surroundings = _surroundings(log, chain, names, instants)
-    result = simulate(
-        plant, body, simulated_arm.motors, simulated_arm.control, clock, reference, surroundings, reference[0]
-    )
+    drive = body, simulated_arm.motors, simulated_arm.control
+    result = simulate(plant, *drive, clock, reference, surroundings, reference[0])
     if not all(np.isfinite(values).all() for values in result):
-        raise BadScenario(
-            f"{scenario.name}: log {log.name}: the control loop is unstable; lower its gains, or shorten arm.tick"
-        )
+        remedy = "the control loop is unstable; lower its gains, or shorten arm.tick"
+        raise BadScenario(f"{scenario.name}: log {log.name}: {remedy}")
     q, dq, tau, tau_ext, force = (values[skipped:] for values in result)
     motions = {
         name: SimulatedMotion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
@@ -119,9 +118,8 @@ def _surroundings(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -
         q = [tissue.surface if name in log.moves else log.held.get(name, 0.0) for name in names]
         surface = np.array(kinematics.tip(chain, q))
     stiffness, damping = (tissue.stiffness, tissue.damping) if tissue else (0.0, 0.0)
-    return Surroundings(
-        efforts, forces, log.mass, stiffness, damping, surface, UP.copy(), bool(log.tip) or tissue is not None
-    )
+    at_tip = bool(log.tip) or tissue is not None
+    return Surroundings(efforts, forces, log.mass, stiffness, damping, surface, UP.copy(), at_tip)
 
 
 def mass_position(scenario: Scenario) -> Array:
@@ -142,10 +140,9 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     drives = Drives(simulated_arm.motors.gear_ratio, simulated_arm.rotors, friction.viscous, friction.coulomb_up)
     parameters = {}
     for i, joint in enumerate(scenario.robot.joints):
-        symmetric = (
-            friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]
-        )
-        if not symmetric or friction.bristle_stiffness[i] > 0:
+        levels = {float(x[i]) for x in (friction.coulomb_up, friction.coulomb_down, friction.static_up,
+                                        friction.static_down)}  # fmt: skip
+        if len(levels) > 1 or friction.bristle_stiffness[i] > 0:
             continue
         values = reduced_parameters(chain, bodies, i, len(scenario.robot.joints), drives)
         names = [term.name for term in joint.terms]

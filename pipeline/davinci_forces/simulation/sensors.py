@@ -112,33 +112,20 @@ def lvm(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: 
     text = StringIO()
     np.savetxt(text, np.column_stack([x, *(c.samples for c in columns)]), "%.6f", delimiter="\t", newline="\r\n")
     rows = text.getvalue() if timed else "".join(f"\t{row}" for row in text.getvalue().splitlines(keepends=True))
-    lines = [*_lvm_header(started, timed), *_lvm_segment(columns, rate, started), "\t".join(names)]
-    path.write_bytes(("\r\n".join(lines) + "\r\n" + rows).encode())
-
-
-def _lvm_header(started: str, timed: bool) -> list[str]:
-    date, time = _date_time(started)
-    entries = {
+    date, _, time = started.replace("-", "/").partition("T")
+    of_file = {
         "Writer_Version": "2", "Reader_Version": "2", "Separator": "Tab", "Decimal_Separator": ".",
         "Multi_Headings": "No", "X_Columns": "One" if timed else "No", "Time_Pref": "Relative",
-        "Operator": "simulation", "Description": DESCRIPTION, "Date": date, "Time": time, "***End_of_Header***": "",
+        "Operator": "simulation", "Description": DESCRIPTION, "Date": date, "Time": f"{time}.000000",
+        "***End_of_Header***": "",
     }  # fmt: skip
-    return ["LabVIEW Measurement\t", *(f"{key}\t{value}" for key, value in entries.items()), "\t"]
-
-
-def _lvm_segment(columns: Sequence[SimulatedChannel], rate: float, started: str) -> list[str]:
-    date, time = _date_time(started)
-    entries = {
-        "Samples": str(len(columns[0].samples)), "Date": date, "Time": time, "Y_Unit_Label": "", "X_Dimension": "Time",
-        "X0": "0.0000000000000000E+0", "Delta_X": f"{1 / rate:.6f}", "***End_of_Header***": "",
+    of_segment = {
+        "Samples": str(len(columns[0].samples)), "Date": date, "Time": f"{time}.000000", "Y_Unit_Label": "",
+        "X_Dimension": "Time", "X0": "0.0000000000000000E+0", "Delta_X": f"{1 / rate:.6f}", "***End_of_Header***": "",
     }  # fmt: skip
-    lines = [f"Channels\t{len(columns)}" + "\t" * len(columns)]
-    for key, value in entries.items():
+    lines = ["LabVIEW Measurement\t", *(f"{key}\t{value}" for key, value in of_file.items()), "\t"]
+    lines.append(f"Channels\t{len(columns)}" + "\t" * len(columns))
+    for key, value in of_segment.items():
         cells = [c.unit for c in columns] if key == "Y_Unit_Label" else [value] * len(columns)
         lines.append("\t".join([key, *cells, ""]))
-    return lines
-
-
-def _date_time(started: str) -> tuple[str, str]:
-    date, _, time = started.partition("T")
-    return date.replace("-", "/"), f"{time}.000000"
+    path.write_bytes(("\r\n".join([*lines, "\t".join(names)]) + "\r\n" + rows).encode())

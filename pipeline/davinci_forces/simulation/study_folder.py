@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
+from davinci_forces.maths.signals.windows import spans
 from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, mass_position, simulate_log, theta
 from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
@@ -181,11 +182,7 @@ def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
 
 def contact_times(run: SimulatedRun) -> list[list[float]]:
     """The contacts of the tip: [onset, end] [s] of each, accurate to one sample."""
-    if run.force is None:
-        return []
-    contact = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])
-    edges = np.flatnonzero(contact[1:] != contact[:-1])
-    return [[float(run.t[start]), float(run.t[end - 1])] for start, end in edges.reshape(-1, 2).tolist()]
+    return [] if run.force is None else [[*span] for span in spans(run.t, np.linalg.norm(run.force, axis=1) > 0)]
 
 
 def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.float64]]) -> list[str]:

@@ -20,7 +20,7 @@ from davinci_forces.maths.estimation.swarm import MAX_ITERATIONS, PARTICLES, PAT
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.models.physical import physical_lumping
-from davinci_forces.maths.models.terms import gravity_cos, gravity_sin, inertia
+from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
 from davinci_forces.robots import davinci, davinci_chain
 from davinci_forces.robots.robot import Joint
@@ -99,8 +99,10 @@ def numbers(results: Mapping[str, tuple[float, float]]) -> tuple[PrintedNumbers,
         for name, printed in table.items():
             unknown = np.full(len(printed), np.nan)
             here, std = computed.get(name, unknown), np.zeros(len(printed))
-            if item in TABLES and name in ESTIMATORS:
-                here, std = fitted_parameters(TABLES[item], name, results)
+            if item in TABLES and name in ESTIMATORS:  # parameters in a study; NaN if it has none
+                joint = TABLES[item]
+                keys = (f"fit.{joint.name}.independent.{name}.{slug(term.name)}" for term in joint.terms)
+                here, std = np.array([results.get(key, (np.nan, np.nan)) for key in keys]).T
             why = read()["why"].get(item, {}).get(name, "")
             compared.append(PrintedNumbers(item, name, tuple(map(Decimal, printed)), np.asarray(here, float), std, why))
     return tuple(compared)
@@ -129,13 +131,6 @@ def text(results: Mapping[str, tuple[float, float]]) -> str:
                     why = f" ({x.why})" if x.differ.any() else ""
                     lines.append(f"    {x.name}: {x.printed_text}; here {x.here_text}{why}")
     return "\n".join(lines)
-
-
-def fitted_parameters(joint: Joint, estimator: str, results: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-    """Parameters of a joint by one estimator in a study, with their standard errors; NaN if the study has none."""
-    keys = (f"fit.{joint.name}.independent.{estimator}.{slug(term.name)}" for term in joint.terms)
-    value, std = np.array([results.get(key, (np.nan, np.nan)) for key in keys]).T
-    return value, std
 
 
 def links() -> dict[str, Array]:
@@ -167,44 +162,34 @@ def pose() -> dict[str, Array]:
     return {"q at the start": np.array(davinci.POSE), "reference": np.array(davinci.POSE)}
 
 
-def factor(joint: Joint, term: str, monomial: str) -> float:
-    """The factor of a monomial such as m3 or m3 lc3 in one parameter of a joint."""
+def factors(joint: Joint, term: Term, monomials: str) -> Array:
+    """The factors of monomials, such as m3 or m3 lc3, in one parameter of a joint."""
     assert joint.physical is not None
-    names = tuple(term.name for term in joint.terms)
-    lumping = physical_lumping(joint.physical, joint.gear_ratio, names)
+    lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
     assert lumping is not None
     place = [x.name.removesuffix("L") for x in joint.physical.parameters]
-    wanted = sorted([place.index(word) for word in monomial.split()])
-    column = [sorted(set(row) - {len(place)}) == wanted for row in lumping.factors.tolist()]
-    squares = [len(set(row)) < len(row) and len(place) not in row for row in lumping.factors.tolist()]
-    [index] = [i for i, (same, square) in enumerate(zip(column, squares, strict=True)) if same and not square]
-    return float(lumping.coefficients[names.index(term), index])
-
-
-def factors(joint: Joint, term: str, *monomials: str) -> Array:
-    """The factors of several monomials in one parameter of a joint."""
-    return np.array([factor(joint, term, monomial) for monomial in monomials])
+    columns = [sorted(i for i in row if i < len(place)) for row in lumping.factors.tolist()]
+    wanted = (sorted(place.index(word) for word in monomial.split()) for monomial in monomials.split(", "))
+    return lumping.coefficients[joint.terms.index(term), [columns.index(monomial) for monomial in wanted]]
 
 
 def roll_factors() -> dict[str, Array]:
     """The coefficients of (6.7), from the chain."""
-    parts = ("m3", "m4", "m5", "m3 lc3", "m5 lc5")
+    parts = "m3, m4, m5, m3 lc3, m5 lc5"
     return {
-        "factors of m3, m4, m5, m3 lc3, m5 lc5 in the inertia": factors(ROLL, inertia.name, *parts),
-        "of m3, m4, m5, m3 lc3, m5 lc5 in the sine": factors(ROLL, gravity_sin.name, *parts),
+        f"factors of {parts} in the inertia": factors(ROLL, inertia, parts),
+        f"of {parts} in the sine": factors(ROLL, gravity_sin, parts),
     }
 
 
 def pitch_factors() -> dict[str, Array]:
     """The coefficients of (6.10), from the chain."""
-    masses = ("m3", "m4", "m5", "m6", "m8")
+    bars, wrist, masses = "m3, m5, m3 lc3, m5 lc5", "m6 lc6, m7 lc7, m8 lc8, m9 lc9", "m3, m4, m5, m6, m8"
     return {
-        "factors of m3, m5, m3 lc3, m5 lc5 in the inertia": factors(
-            PITCH, inertia.name, "m3", "m5", "m3 lc3", "m5 lc5"
-        ),
-        "of m6 lc6, m7 lc7, m8 lc8, m9 lc9": factors(PITCH, inertia.name, "m6 lc6", "m7 lc7", "m8 lc8", "m9 lc9"),
-        "of m3, m4, m5, m6, m8 in the sine": factors(PITCH, gravity_sin.name, *masses),
-        "of m3, m4, m5, m6, m8 in the cosine": factors(PITCH, gravity_cos.name, *masses),
+        f"factors of {bars} in the inertia": factors(PITCH, inertia, bars),
+        f"of {wrist}": factors(PITCH, inertia, wrist),
+        f"of {masses} in the sine": factors(PITCH, gravity_sin, masses),
+        f"of {masses} in the cosine": factors(PITCH, gravity_cos, masses),
     }
 
 
@@ -245,12 +230,9 @@ def swarm() -> dict[str, Array]:
 def counts() -> dict[str, Array]:
     """Numbers of physical parameters, and of parameters of the models."""
     joints = davinci.ROBOT.joints
-    return {
-        "physical parameters of roll, pitch, slide": np.array(
-            [len(j.physical.parameters) for j in joints if j.physical]
-        ),
-        "parameters of roll, pitch, slide": np.array([len(j.terms) for j in joints]),
-    }
+    physical = np.array([len(joint.physical.parameters) for joint in joints if joint.physical])
+    lumped = np.array([len(joint.terms) for joint in joints])
+    return {"physical parameters of roll, pitch, slide": physical, "parameters of roll, pitch, slide": lumped}
 
 
 def parameters(joint: Joint) -> dict[str, Array]:

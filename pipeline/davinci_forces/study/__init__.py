@@ -5,20 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.haptics.scenario import HapticScenario
+from davinci_forces.haptics.scenario import HapticScenario as HapticScenario
+from davinci_forces.logs.log import Options as Options
 from davinci_forces.robots.robot import Robot
-
-__all__ = [
-    "WHOLE_LOG",
-    "AttachedMass",
-    "HapticScenario",
-    "LogEntry",
-    "Settings",
-    "Source",
-    "Study",
-    "Weighing",
-    "Weighings",
-]
 
 WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
@@ -100,12 +89,7 @@ class LogEntry:
     free: tuple[tuple[float, float], ...] = ()
     weight: AttachedMass | None = None
     tare: str = ""  # the log of the same path that is subtracted from a weight log
-    delimiter: str | None = None
-    decimal: str | None = None
-    header: bool | None = None
-    encoding: str | None = None
-    dtype: str | None = None  # of raw binary numbers
-    columns: int | tuple[str, ...] | None = None  # of raw binary numbers in a row: their count or names
+    options: Options = field(default_factory=Options)  # how its files are read
 
     @property
     def has_known_free_motion(self) -> bool:

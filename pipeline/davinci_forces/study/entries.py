@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.logs.binary import BINARY_EXAMPLE, dtype_of
+from davinci_forces.logs.log import Options
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.study import WHOLE_LOG, AttachedMass, LogEntry
@@ -81,11 +82,13 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         free=_windows(table, "free"),
         weight=_weight(table, robot),
         tare=table.text("tare", ""),
-        delimiter=_delimiter(table),
-        decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
-        header=table.flag("header") if "header" in table else None,
-        encoding=table.text("encoding") if "encoding" in table else None,
-        **_binary(table),
+        options=Options(
+            delimiter=_delimiter(table),
+            decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
+            header=table.flag("header") if "header" in table else None,
+            encoding=table.text("encoding") if "encoding" in table else None,
+            **_binary(table),
+        ),
     )
     table.close()  # reports unknown keys
     return entry

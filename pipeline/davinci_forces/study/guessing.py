@@ -140,7 +140,8 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
             joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
         else:
             joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, channel.alias or channel.name)]
-        symbol = symbol_of(words) or _beside_a_joint(words)
+        # Beside a joint, a force is its effort; the force at the tip is none.
+        symbol = symbol_of(words) or (symbol_of(["tau", *words]) if "force" in words else "")
         if len(joints) != 1 or not symbol:
             continue
         symbol = _side(symbol, words, channel, robot.joints[joints[0]])
@@ -153,11 +154,6 @@ def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
     """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
     with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
     return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
-
-
-def _beside_a_joint(words: Sequence[str]) -> str:
-    """The effort of a named joint that is called a force; the force at the tip is none."""
-    return symbol_of(["tau", *words]) if "force" in words else ""
 
 
 def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> str:
@@ -256,7 +252,7 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
     timing = timing_of(log, samples, pairs, unnamed)
     joints = sorted(q)
     moving = tuple(joints[i] for i in columns.moving_positions([q[joint] for joint in joints]))
-    again = repetition([q[joint] for joint in moving]) if moving and _one_length(q, moving) else None
+    again = repetition([q[joint] for joint in moving]) if len({len(q[joint]) for joint in moving}) == 1 else None
     velocity = dq.get(moving[0], np.gradient(q[moving[0]])) if len(moving) == 1 else None
     step = timing.step or 1.0
     courses = {
@@ -275,7 +271,3 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
         steady=velocity is not None and columns.is_steady(velocity),
         ranges=tuple((float(q[joint].min()), float(q[joint].max())) for joint in joints),
     )  # fmt: skip
-
-
-def _one_length(q: dict[int, Array], joints: Sequence[int]) -> bool:
-    return len({len(q[joint]) for joint in joints}) == 1

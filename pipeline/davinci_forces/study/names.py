@@ -31,27 +31,11 @@ OTHER_WORDS = {
 }  # fmt: skip
 ROUGH_WORDS = ("raw", "unfiltered")  # a signal of such a name is taken where there is no other
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
-TIME_QUALIFIERS = {
-    "robot",
-    "ros",
-    "system",
-    "rel",
-    "relative",
-    "abs",
-    "header",
-    "elapsed",
-    "epoch",
-    "unix",
-    "field",
-    "x",
-}
+TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-PSM_JOINTS = {
-    "yaw": "hand_roll",
-    "pitch": "hand_pitch",
-    "insertion": "instrument_slide",
-}  # of the da Vinci Research Kit
+# Joints of the da Vinci Research Kit by its own labels.
+PSM_JOINTS = {"yaw": "hand_roll", "pitch": "hand_pitch", "insertion": "instrument_slide"}
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,7 @@ from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
-MAX_ANGLE_DRIVE = (
-    6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
-)
+MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way, as drives with limits turn; larger may be degrees
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
 
@@ -190,15 +188,10 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf") and any("i" in draft.guess.symbols() for draft in drawn):
-        yield from _in_amperes(robot)
-
-
-def _in_amperes(robot: Robot) -> Iterator[str]:
-    """Lines that make currents the effort of joints, as a URDF has no torque constants."""
-    for joint in robot.joints:
-        yield ""
-        yield f"[robot_overrides.{joint.name}]"
-        yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
+        for joint in robot.joints:  # a URDF has no torque constants
+            yield ""
+            yield f"[robot_overrides.{joint.name}]"
+            yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:

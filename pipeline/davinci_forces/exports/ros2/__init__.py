@@ -33,7 +33,9 @@ def render(export: Export) -> dict[str, str]:
     head = [line.replace("--", "- -").replace('"""', "'''").replace("\\", "/") for line in export.head()]
     values = {"HEAD": "\n".join(head), "COMMENT": "\n".join(f"# {line}" for line in head), "NAME": NAME}
     values["VERSION"] = ".".join(part for part in export.origin.version.split(".") if part.isdigit())
-    files = {name: _template(name, values) for name in TEMPLATES}
+    files = {name: text_of(read_bytes(Path(__file__).with_name(f"{name}.in"))) for name in TEMPLATES}
+    for key, value in values.items():
+        files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
     files[f"{NAME}/node.py"] = files.pop("node.py")
     for module in CORE:
         source = text_of(read_bytes(Path(str(module.__file__))))
@@ -47,10 +49,3 @@ def render(export: Export) -> dict[str, str]:
         f"{NAME}/__init__.py": f'"""External efforts of an arm.\n\n{values["HEAD"]}\n"""\n',
         f"{NAME}/model.json": json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
     }
-
-
-def _template(name: str, values: dict[str, str]) -> str:
-    text = text_of(read_bytes(Path(__file__).with_name(f"{name}.in")))
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", value)
-    return text

@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compile_and_store, compile_function
+from davinci_forces.maths.arrays import Array, Booleans, records
+from davinci_forces.maths.compiled import compile_and_store, compile_function, inline
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Motors
 from davinci_forces.maths.simulation.control import drive, follow, read
-from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
+from davinci_forces.maths.simulation.step import Friction, at_rest, middle, step
 
 FRICTION_VELOCITY = 1e-3  # w [m/s]; at lower velocities the tissue's friction falls smoothly to 0
 
@@ -88,24 +88,22 @@ class LoopRun(NamedTuple):
     estimates: Array  # [N]
 
 
-class _Loop(NamedTuple):
-    """The state of the loop, in few arrays, because each argument of compiled code takes time at every call."""
+class _Axis(NamedTuple):
+    """The axis and its state, in few arrays, because each array of an argument takes time to compile and at each call.
 
-    hand: Array  # (2,)
-    state: Array  # (4, 1), a `State`
-    loops: Array  # (8, 1), `Loops`
-    last: Array  # (3, 1): effort and angle of the motor, and the last estimated force
-    sent_motion: Array  # (messages, 2) position and velocity of the hand
-    sent_forces: Array  # (messages,) [N]
+    The first five are records (1,) with the fields of the named tuples.
+    """
 
-
-class _Plant(NamedTuple):
-    """The constants of the axis, in few arrays for the same reason."""
-
-    motors: Array  # (7, 1)
-    law: Array  # (7, 1)
-    friction: Array  # (8, 1)
-    body: Array  # (4, 1): inertia, gravity, and both stops
+    motors: Any
+    law: Any
+    friction: Any
+    loops: Any
+    state: Any
+    tau: Array  # (1,) [N]
+    moving: Booleans  # (1,)
+    inertia: Array  # as in `Axis`
+    gravity: Array
+    stops: tuple[Array, Array]
     exact: bool
 
 
@@ -119,17 +117,17 @@ def simulate(
     each period of the controller, in order.
     """
     T, turns = len(push), len(noise)
-    messages = -(-T // clocks.message) + 1
-    state, loops = np.array(at_rest(np.array([device.motion * start[0]]))), np.zeros((8, 1))
-    read(axis.motors, state[0], loops[Loops._fields.index("angle")])
-    loop = _Loop(np.array(start), state, loops, np.zeros((3, 1)), np.zeros((messages, 2)), np.zeros(messages))
-    body = np.array([axis.inertia[0], axis.gravity, *axis.stops])
-    plant = _Plant(np.array(axis.motors), np.array(axis.law), np.array(axis.friction), body, axis.exact)
+    state, loops = at_rest(np.array([device.motion * start[0]])), Loops(*np.zeros((len(Loops._fields), 1)))
+    arm = _Axis(
+        records(axis.motors), records(axis.law), records(axis.friction), records(loops), records(state), np.zeros(1),
+        np.ones(1, np.bool_), axis.inertia, axis.gravity, axis.stops, axis.exact,
+    )  # fmt: skip
+    hand, sent = np.array(start), np.zeros((-(-T // clocks.message) + 1, 3))
     readings, estimates, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
-    for k in range(turns):
-        _sense(device, plant, tissue, clocks, noise, loop, k, readings)
-        estimates[k] = loop.last[2, 0] = estimate(SensorReading(*readings[k].tolist()))
-        _run_ticks(grip, device, plant, tissue, clocks, push, loop, k, ticks)
+    for k in range(turns + 1):
+        _run_period(k, grip, device, arm, tissue, clocks, push, noise, hand, sent, estimates, readings, ticks)
+        if k < turns:
+            estimates[k] = estimate(SensorReading(*readings[k].tolist()))
     x, dx, q, true, felt = ticks.T
     return LoopRun(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, estimates)
 
@@ -143,87 +141,75 @@ def tissue_force(tissue: Any, x: float, dx: float) -> float:
     return float(force * (1.0 + tissue.friction * dx / np.sqrt(dx * dx + FRICTION_VELOCITY * FRICTION_VELOCITY)))
 
 
-@compile_function
-def _parts(plant: Any, loop: Any) -> Any:
-    """Motors, law, friction, loops and state as named tuples of rows."""
-    m, c, f, i, s = plant.motors, plant.law, plant.friction, loop.loops, loop.state
-    return (
-        Motors(m[0], m[1], m[2], m[3], m[4], m[5], m[6]),
-        Cascade(c[0], c[1], c[2], c[3], c[4], c[5], c[6]),
-        Friction(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7]),
-        Loops(i[0], i[1], i[2], i[3], i[4], i[5], i[6], i[7]),
-        State(s[0], s[1], s[2], s[3]),
-    )
-
-
 @compile_and_store
-def _sense(device: Any, plant: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
-    """Start a period of the controller: follow the latest reference and read the sensors."""
-    now, h = k * clocks.turn, clocks.tick
+def _run_period(
+    k: int, grip: Any, device: Any, arm: Any, tissue: Any, clocks: Any, push: Any, noise: Any, hand: Any, sent: Any,
+    estimates: Any, readings: Any, ticks: Any,
+) -> None:  # fmt: skip
+    """Advance hand and arm over the ticks of period k - 1, if there is one, and read the sensors of period k.
+
+    `sent` has the position and velocity of the hand and the force, as each message transmits them.
+    """
+    motors, state, tau = arm.motors, arm.state, arm.tau
+    for now in range((k - 1) * clocks.turn if k > 0 else -1, min(k * clocks.turn, len(push))):
+        if now >= 0:
+            force = _felt_force(device, clocks, now, sent, estimates)
+            ticks[now, 0], ticks[now, 1], ticks[now, 2] = hand[0], hand[1], state.q[0]
+            ticks[now, 3], ticks[now, 4] = tissue_force(tissue, state.q[0], state.dq[0]), force
+            if not arm.exact:
+                _move_arm(arm, tissue, clocks.tick)
+            _move_hand(grip, hand, push[now] - force, now)
+        if now + 1 < len(push):
+            _control(device, arm, clocks, now + 1, hand, sent)
+    if k < len(noise):
+        motor_angle, resolution = motors.gear_ratio[0] * (state.q[0] + noise[k, 0]), motors.encoder_step[0]
+        if resolution > 0.0:
+            motor_angle = resolution * np.rint(motor_angle / resolution)
+        readings[k, 0] = motor_angle / motors.gear_ratio[0]
+        readings[k, 1] = state.dq[0] + noise[k, 1]
+        readings[k, 2] = tau[0] + noise[k, 2]
+        readings[k, 3] = tissue_force(tissue, state.q[0], state.dq[0])
+
+
+@inline
+def _control(device: Any, arm: Any, clocks: Any, now: int, hand: Any, sent: Any) -> None:
+    """Send the motion of the hand as the device measures it, and set the motor's effort of this tick."""
+    state, angle, reference, tick = arm.state, np.empty(1), np.empty(1), now % clocks.turn
     if now % clocks.message == 0:
-        _send_motion(device, loop, now // clocks.message)
-    reference = device.motion * loop.sent_motion[max(now - clocks.out, 0) // clocks.message]
-    motors, law, _, loops, state = _parts(plant, loop)
-    tau, angle = loop.last[0], loop.last[1]
-    if plant.exact:
-        state.q[0], state.dq[0] = reference[0], reference[1]
-    else:
-        read(motors, state.q, angle)
-        follow(motors, law, loops, reference[:1], angle, h * clocks.turn)
-        drive(motors, law, loops, angle, state.dq, 1.0 / clocks.turn, h, tau)
-    motor_angle, resolution = motors.gear_ratio[0] * (state.q[0] + noise[k, 0]), motors.encoder_step[0]
-    if resolution > 0.0:
-        motor_angle = resolution * np.round(motor_angle / resolution)
-    readings[k, 0] = motor_angle / motors.gear_ratio[0]
-    readings[k, 1] = state.dq[0] + noise[k, 1]
-    readings[k, 2] = tau[0] + noise[k, 2]
-    readings[k, 3] = tissue_force(tissue, state.q[0], state.dq[0])
+        x = device.step * np.rint(hand[0] / device.step) if device.step > 0.0 else hand[0]
+        sent[now // clocks.message, 0], sent[now // clocks.message, 1] = x, hand[1]
+    received = max(now - clocks.out, 0) // clocks.message
+    reference[0] = device.motion * sent[received, 0]
+    if not arm.exact:
+        read(arm.motors, state.q, angle)
+        if now == 0:
+            arm.loops.angle[0] = angle[0]
+        if tick == 0:
+            follow(arm.motors, arm.law, arm.loops, reference, angle, clocks.tick * clocks.turn)
+        drive(arm.motors, arm.law, arm.loops, angle, state.dq, (tick + 1) / clocks.turn, clocks.tick, arm.tau)
+    elif tick == 0:
+        state.q[0], state.dq[0] = reference[0], device.motion * sent[received, 1]
 
 
-@compile_function
-def _send_motion(device: Any, loop: Any, message: int) -> None:
-    """Send the position and velocity of the hand, as the device measures them."""
-    x = loop.hand[0]
-    loop.sent_motion[message, 0] = device.step * np.round(x / device.step) if device.step > 0.0 else x
-    loop.sent_motion[message, 1] = loop.hand[1]
+@inline
+def _felt_force(device: Any, clocks: Any, now: int, sent: Any, estimates: Any) -> float:
+    """Send the latest force, and return the force of the device on the hand."""
+    if now % clocks.message == 0:
+        sent[now // clocks.message, 2] = estimates[now // clocks.turn]
+    force = device.force * sent[(now - clocks.back) // clocks.message, 2] if now >= clocks.back else 0.0
+    return float(min(max(force, -device.strongest), device.strongest))
 
 
-@compile_and_store
-def _run_ticks(
-    grip: Any, device: Any, plant: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
-) -> None:
-    """Advance hand and arm by the ticks of one period of the controller."""
-    motors, law, friction, loops, state = _parts(plant, loop)
-    tau, angle, h = loop.last[0], loop.last[1], clocks.tick
-    for tick in range(min(clocks.turn, len(push) - k * clocks.turn)):
-        now = k * clocks.turn + tick
-        if now % clocks.message == 0:
-            if tick > 0:
-                _send_motion(device, loop, now // clocks.message)
-            loop.sent_forces[now // clocks.message] = loop.last[2, 0]
-        if tick > 0 and not plant.exact:
-            read(motors, state.q, angle)
-            drive(motors, law, loops, angle, state.dq, (tick + 1) / clocks.turn, h, tau)
-        force = device.force * loop.sent_forces[(now - clocks.back) // clocks.message] if now >= clocks.back else 0.0
-        force = min(max(force, -device.strongest), device.strongest)
-        true = tissue_force(tissue, state.q[0], state.dq[0])
-        ticks[now, 0], ticks[now, 1], ticks[now, 2] = loop.hand[0], loop.hand[1], state.q[0]
-        ticks[now, 3], ticks[now, 4] = true, force
-        if not plant.exact:
-            _move_arm(plant.body, friction, tissue, tau, state, h)
-        _move_hand(grip, loop.hand, push[now] - force, now)
-
-
-@compile_function
-def _move_arm(body: Any, friction: Any, tissue: Any, tau: Any, state: Any, h: float) -> None:
+@inline
+def _move_arm(arm: Any, tissue: Any, h: float) -> None:
     """Advance the arm by one tick."""
     q, dq, free = np.empty(1), np.empty(1), np.empty(1)
-    middle(state, h, q, dq)
-    free[0] = tau[0] - tissue_force(tissue, q[0], dq[0])
-    step(body[:1], body[1], free, friction, body[2], body[3], state, np.ones(1, np.bool_), h)
+    middle(arm.state, h, q, dq)
+    free[0] = arm.tau[0] - tissue_force(tissue, q[0], dq[0])
+    step(arm.inertia, arm.gravity, free, arm.friction, arm.stops[0], arm.stops[1], arm.state, arm.moving, h)
 
 
-@compile_function
+@inline
 def _move_hand(grip: Any, hand: Any, net: float, now: int) -> None:
     """Advance the hand by one tick, under a constant net force [N]."""
     if len(grip.path):

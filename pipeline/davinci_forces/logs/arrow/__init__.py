@@ -1,11 +1,12 @@
 """Parquet and Feather (Arrow IPC) files: columns of numbers and times, with units from the field metadata."""
 
+from functools import partial
 from pathlib import Path
 
-from davinci_forces.logs.isolated import reader
+from davinci_forces.logs import isolated
 
 ARROW_BEGINNINGS = (b"PAR1", b"ARROW1\0\0", b"FEA1")
-read = reader("davinci_forces.logs.arrow.table")
+read = partial(isolated.read, reader="davinci_forces.logs.arrow.table")
 
 
 def recognises(path: Path, head: bytes) -> bool:

@@ -23,10 +23,7 @@ BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
 MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, above which it is mapped instead of read into memory
 PARQUET = {"pre_buffer": False, "buffer_size": BUFFER, "page_checksum_verification": True}  # else it holds row groups
 LISTS = (pa.types.is_fixed_size_list, pa.types.is_list, pa.types.is_large_list)
-EPISODES = (
-    "timestamp",
-    "episode_index",
-)  # columns of LeRobot: times [s] that begin anew, and the number of the episode
+EPISODES = ("timestamp", "episode_index")  # columns of LeRobot: times [s] that begin anew, and the episode's number
 EPISODE_GAP = 1.0  # [s] between episodes: longer than any sampling time of a robot, so that none is joined to the next
 UNIT_KEYS = (b"unit", b"units")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
@@ -35,13 +32,7 @@ Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it has no columns, or one name twice.
-    """
+    """Open the file; raises BadLog if it has no columns, or one name twice."""
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a unique name")

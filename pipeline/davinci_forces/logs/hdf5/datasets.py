@@ -22,13 +22,7 @@ MAX_REFERENCES = 1000
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it holds no dataset of samples.
-    """
+    """Open the file; raises BadLog if it holds no dataset of samples."""
     file = h5py.File(path, "r", locking=False)
     log = ArrayLog(path, "hdf5", ())
     log.facts |= {name: text for name in file.attrs if (text := _text(file.attrs[name]))}

@@ -4,7 +4,7 @@ A damaged file can crash such a library, keep it busy for ever, or make it reque
 the child process is lost, and the file is a `BadLog` like any other.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,31 +27,18 @@ MAX_COMPRESSION = 2000  # size of the samples over that of the file, at most; th
 HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hold a few samples
 
 
-def reader(module: str, package: str = "", extra: str = "") -> Callable[[Path, Options], Log]:
-    """Make the `read` of a format from the module that reads it in a child process; both raise BadLog."""
-
-    def read(path: Path, options: Options) -> Log:
-        if package:
-            require(path, package, extra)
-        return start(path, options, module)
-
-    return read
-
-
-def require(path: Path, package: str, extra: str) -> None:
-    """Require the package that reads a format, and say how to install it; raises BadLog where it is not."""
-    if find_spec(package) is None:
-        raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")
-
-
-def start(path: Path, options: Options, reader: str) -> Log:
+def read(path: Path, options: Options, reader: str, package: str = "", extra: str = "") -> Log:
     """Open a log in a child process; `reader` is a module that exports `open_in_child(path, options) -> Log`.
+
+    It may need an optional package, which the extra of this name installs.
 
     Raises
     ------
     BadLog
-        If it cannot be read within the limits.
+        If that package is not installed, or the log cannot be read within the limits.
     """
+    if package and find_spec(package) is None:
+        raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")
     request = _request(path, options, reader)
     for message, _ in _answers(path, request):
         state = message

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
@@ -14,7 +13,7 @@ from davinci_forces.logs.log import Block, Log
 from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
-from davinci_forces.logs.timeline import OwnClock, Sampling
+from davinci_forces.logs.timeline import OwnClock
 from davinci_forces.maths.arrays import Array, Booleans
 
 MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
@@ -89,20 +88,18 @@ class Reading:
                 "is not a number; correct the cell, or take the row out of the log"
             ) from None
 
-    def _wanted(self, run: Run) -> dict[int, str]:
-        return self._columns_of(run, self.names)
-
     def _columns_of(self, run: Run, channels: Sequence[str]) -> dict[int, str]:
         names = ((i, run.name(i)) for i in range(run.width - run.commented))
         return {i: name for i, name in names if name in channels}
 
     def _columns(self, run: Run) -> list[int]:
-        return sorted({0, *self._wanted(run), *self._columns_of(run, self.together)})
+        return sorted({0, *self._columns_of(run, self.names), *self._columns_of(run, self.together)})
 
     def _block(self, run: Run, cells: Cells) -> Block:
         """Return the samples of a run by the names of their channels."""
-        block: Block = {name: cells.columns[i] for i, name in self._wanted(run).items()}
-        empty = {name: cells.empty[i] for i, name in self._wanted(run).items() if i in cells.empty}
+        wanted = self._columns_of(run, self.names)
+        block: Block = {name: cells.columns[i] for i, name in wanted.items()}
+        empty = {name: cells.empty[i] for i, name in wanted.items() if i in cells.empty}
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
@@ -176,19 +173,17 @@ class Reading:
             before = np.concatenate(([self.last_x], x[:-1]))
             begins = x <= before
             begins[run.begins] = False
-            self._went_back(run, np.flatnonzero(begins), before, x)
+            back = np.flatnonzero(begins)
+            if len(back) and not self.back:
+                i = int(back[0])
+                word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
+                self.went_back = f"line {run.line(i)}: x {word} {x[i]:g} in row {self.rows + i + 1}"
+            self.back += len(back)
             self.last_x = x[-1]
         begins[run.begins] = True
         writes = self.write + np.cumsum(begins)
         self.write = int(writes[-1]) if rows else self.write
         return writes.astype(np.float64)
-
-    def _went_back(self, run: Run, rows: NDArray[np.intp], before: Array, x: Array) -> None:
-        if len(rows) and not self.back:
-            i = rows[0]
-            word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
-            self.went_back = f"line {run.line(int(i))}: x {word} {x[i]:g} in row {self.rows + int(i) + 1}"
-        self.back += len(rows)
 
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
         """Compute the time [s] since the start of the first file segment, from the headers of a channel.
@@ -198,19 +193,15 @@ class Reading:
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
         samplings = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
-        starts = [self._seconds_from_first(sampling) for sampling in samplings]
+        zero = self.first.start if self.first else None
+        dates = (sampling.start for sampling in samplings)
+        starts = [np.nan if start is None or zero is None else float(start - zero) for start in dates]
         if x is None:
             x0, step = [sampling.x0 for sampling in samplings], [sampling.step for sampling in samplings]
             number = np.arange(rows) - np.repeat(firsts, counts)
             number[: counts[0]] += before
             x = np.repeat(x0, counts) + np.repeat(step, counts) * number
         return np.where(np.abs(x) > MIN_ABSOLUTE_X, x, x + np.repeat(starts, counts))
-
-    def _seconds_from_first(self, sampling: Sampling) -> float:
-        """Time from the start of the log to that of a file segment [s]; NaN if one has no date."""
-        assert self.first is not None
-        start, zero = sampling.start, self.first.start
-        return float(start - zero) if start is not None and zero is not None else np.nan
 
     def _check_samples(self) -> None:
         """Check the header's count of samples: of its write, or with a single header of the first write only."""

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from davinci_forces.files import open_file
-from davinci_forces.logs.isolated import require, start
+from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
 
@@ -15,6 +15,5 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, options: Options) -> Log:
     """Open the file and list its variables; raises BadLog."""
     with open_file(path) as file:
-        if file.read(512).startswith(b"MATLAB 7.3"):
-            require(path, "h5py", "hdf5")
-    return start(path, options, "davinci_forces.logs.mat.variables")
+        needed = {"package": "h5py", "extra": "hdf5"} if file.read(10) == b"MATLAB 7.3" else {}
+    return isolated.read(path, options, reader="davinci_forces.logs.mat.variables", **needed)

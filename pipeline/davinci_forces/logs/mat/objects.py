@@ -58,7 +58,9 @@ class Objects:
         self.count += len(ids)
         if self.count > MAX_OBJECTS:
             raise ValueError(f"the file holds more than {MAX_OBJECTS} objects")
-        return [MatlabObject(self._class(numbers[-1]), self._properties(number)) for number in ids]
+        names, (classes, *_) = self.layout
+        name = str(names[classes[4 * numbers[-1] + 1] - 1])
+        return [MatlabObject(name, self._properties(number)) for number in ids]
 
     @cached_property
     def cells(self) -> Any:
@@ -79,10 +81,6 @@ class Objects:
         offsets = numbers[2:7]
         names = content[40 : offsets[0]].decode("utf-8", "replace").split("\0")
         return names, [numbers[a // 4 : b // 4] for a, b in pairwise(offsets)]
-
-    def _class(self, number: int) -> str:
-        names, (classes, *_) = self.layout
-        return str(names[classes[4 * number + 1] - 1])
 
     def _properties(self, number: int) -> dict[str, Any]:
         names, (_, saved, objects, plain) = self.layout

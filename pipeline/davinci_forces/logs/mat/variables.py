@@ -3,7 +3,8 @@
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,7 @@ OBJECT = "None"  # scipy's name of a variable that holds an object
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it holds no variable of samples.
-    """
+    """Open the file; raises BadLog if it holds no variable of samples."""
     log = ArrayLog(path, "mat", ())
     with open_file(path) as file:
         head = file.read(128)
@@ -81,22 +76,20 @@ class Variable:
     source: Any  # the file, or the bytes of this variable
     name: str
     shape: tuple[int, ...]
-    kept: list[Any] = field(default_factory=list)
+    dtype = np.dtype(np.float64)  # of its elements; complex ones are only known from the values
 
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of its elements; complex ones are only known from the values."""
-        return np.dtype(np.float64)
-
-    def __getitem__(self, part: Any) -> Any:
-        """Read a part of it."""
-        if not self.kept:
-            self.kept.append(_loaded(self.source, self.name))
-        values = self.kept[0]
+    @cached_property
+    def values(self) -> Any:
+        """All elements."""
+        values = _loaded(self.source, self.name)
         values = values.toarray() if hasattr(values, "toarray") else values
         if np.iscomplexobj(values):
             raise BadLog(f"{self.path}: variable {self.name!r} holds complex numbers; save its parts")
-        return values[part]
+        return values
+
+    def __getitem__(self, part: Any) -> Any:
+        """Read a part of it."""
+        return self.values[part]
 
 
 def _loaded(source: Any, name: str) -> Any:

@@ -3,12 +3,11 @@
 from pathlib import Path
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.isolated import reader
+from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
 BAG_BEGINNINGS = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 FOLDER_METADATA = b"rosbag2_bagfile_information:"  # beginning of the description of a bag in a folder
-_read = reader("davinci_forces.logs.ros.bag", "rosbags", "ros")
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -26,4 +25,4 @@ def read(path: Path, options: Options) -> Log:
     """
     if path.is_file() and path.suffix == ".yaml":
         raise BadLog(f"{path}: this file describes a ROS 2 bag; name its folder instead, {path.parent}")
-    return _read(path, options)
+    return isolated.read(path, options, reader="davinci_forces.logs.ros.bag", package="rosbags", extra="ros")

@@ -33,21 +33,15 @@ class Topic:
     unsteady: set[str]  # numbers that some messages lack
 
     @property
-    def stamp_channel(self) -> str:
-        """The channel of the time stamps in the headers."""
-        return f"{self.name}/stamp"
-
-    @property
-    def receipt_channel(self) -> str:
-        """The channel of the times at which the recorder received the messages."""
-        return f"{self.name}/received"
+    def clock(self) -> str:
+        """The channel of its times: those in the headers, or those at which the recorder received the messages."""
+        return f"{self.name}/{'stamp' if self.stamped else 'received'}"
 
     def channels(self, alone: bool) -> list[Channel]:
         """List its clocks and numbers; if it is the only topic, they are on the clock of the log."""
-        times = [self.stamp_channel, self.receipt_channel] if self.first.stamp else [self.receipt_channel]
-        clock = self.stamp_channel if self.stamped else self.receipt_channel
-        time = "" if alone else clock
-        clocks = [Channel(name, "s", "time", time="" if alone or name == clock else clock) for name in times]
+        times = [f"{self.name}/{time}" for time in ("stamp", "received") if self.first.stamp or time == "received"]
+        time = "" if alone else self.clock
+        clocks = [Channel(name, "s", "time", time="" if name == self.clock else time) for name in times]
         joints = {path: unique(names) for path, names in self.first.joints_of.items()}
         for number, place in self.first.numbers.items():
             path, _, i = number.rstrip("]").rpartition("[")
@@ -62,13 +56,7 @@ class Topic:
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the bag.
-
-    Raises
-    ------
-    BadLog
-        If none of its topics has numbers.
-    """
+    """Open the bag; raises BadLog if none of its topics has numbers."""
     bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag, cut=bag.cut, warnings=bag.warnings)
     log.topics = _topics(log, bag)
@@ -80,8 +68,7 @@ def open_in_child(path: Path, options: Options) -> Log:
     alone = len(log.topics) == 1
     log.channels = tuple(channel for topic in log.topics for channel in topic.channels(alone))
     if alone:
-        [topic] = log.topics
-        log.time = topic.stamp_channel if topic.stamped else topic.receipt_channel
+        log.time = log.topics[0].clock
     return log
 
 
@@ -183,7 +170,7 @@ class BagLog(Log):
         self, topic: Topic, names: Sequence[str], connections: Sequence[Any], batch: Batch, number: int
     ) -> Block:
         """Read messages, the first of them with a number; those of one size and layout at once."""
-        values = np.empty((len(names), len(batch.times)))
+        values, received = np.empty((len(names), len(batch.times))), f"{topic.name}/received"
         is_read = np.ones(len(batch.times), bool)
         kinds = np.array(batch.owners) + len(connections) * batch.sizes
         for kind in np.unique(kinds):
@@ -200,11 +187,11 @@ class BagLog(Log):
                 else:
                     there = slice(None) if len(same) == len(kinds) else same
                     for column, name in zip(values, names, strict=True):
-                        if name != topic.receipt_channel:
+                        if name != received:
                             column[there] = self._column(topic, name, layout, part, first)
                 rows, table = rows[~alike], table[~alike]
-        if topic.receipt_channel in names:
-            values[names.index(topic.receipt_channel)] = (batch.times - self.origin) / 1e9
+        if received in names:
+            values[names.index(received)] = (batch.times - self.origin) / 1e9
         return self.count_nans(dict(zip(names, values if is_read.all() else values[:, is_read], strict=True)))
 
     def _layout_of(self, topic: Topic, connection: Any, content: bytes, number: int) -> Layout:

@@ -99,13 +99,7 @@ class Scan:
     chunk: int = 0  # that is scanned
 
     def open(self) -> None:
-        """Scan the file.
-
-        Raises
-        ------
-        BadLog
-            If it is damaged, which a file that ends too early is not.
-        """
+        """Scan the file; raises BadLog if it is damaged, which a file that ends too early is not."""
         with open_file(self.path) as file:
             content = memoryview(mmap(file.fileno(), 0, access=ACCESS_READ))
         self.chunks = [Chunk("", content, len(content))]

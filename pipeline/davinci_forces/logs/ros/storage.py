@@ -48,13 +48,7 @@ class Database:
         self.cut = False
 
     def open(self) -> None:
-        """List the topics.
-
-        Raises
-        ------
-        BadLog
-            If it is no bag.
-        """
+        """List the topics; raises BadLog if it is no bag."""
         address = f"file:{quote(self.path.as_posix(), safe=LITERAL)}?immutable=1"  # no file appears beside it
         try:
             self.base = self._whole_rows() or sqlite3.connect(address, uri=True)
@@ -199,16 +193,14 @@ def _unpacked(batch: Batch) -> Batch:
 
 
 def _opened(paths: Sequence[Path]) -> Sequence[Any]:
-    storages = [_storage(path) for path in paths]
-    for storage in storages:
-        storage.open()
+    storages: list[Any] = []
+    for path in paths:
+        with open_file(path) as file:
+            head = file.read(8)
+        kind = Rosbag1 if head.startswith(b"#ROSBAG") else Mcap if head.startswith(b"\x89MCAP") else Database
+        storages.append(kind(path))
+        storages[-1].open()
     return storages
-
-
-def _storage(path: Path) -> Any:
-    with open_file(path) as file:
-        head = file.read(8)
-    return (Rosbag1 if head.startswith(b"#ROSBAG") else Mcap if head.startswith(b"\x89MCAP") else Database)(path)
 
 
 @lru_cache(maxsize=64)  # bags of one robot share definitions, and parsing them takes longer than reading a small bag

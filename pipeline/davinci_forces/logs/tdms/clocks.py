@@ -48,7 +48,7 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
     longest = _longest(clock_of, sampled)
     derived = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
     timed = tuple(replace(c, time="" if clock_of[c.name] in (main, "") else named[clock_of[c.name]]) for c in channels)
-    if main and named[main] in derived and derived[named[main]].is_uniform:
+    if main and named[main] in derived and len(derived[named[main]].first) == 1:
         timeline = derived.pop(named[main])
         return ClocksFound(_with(timed, derived), Clock(timeline.step[0], timeline.start[0]), "", derived, lent)
     time = named[main] if main else ""

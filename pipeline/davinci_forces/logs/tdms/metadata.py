@@ -50,13 +50,7 @@ class Objects:
     revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # by path: the first values of changed ones
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
-        """Add the metadata of one file segment.
-
-        Raises
-        ------
-        Damaged
-            If it is truncated, or cannot be parsed.
-        """
+        """Add the metadata of one file segment; raises Damaged if it is truncated, or cannot be parsed."""
         take = _Cursor(metadata, order)
         try:
             self._update(take, renew)
@@ -80,7 +74,7 @@ class Objects:
             self.active.pop(path, None)
             return
         if header != AS_BEFORE:
-            self.latest[path] = take.daqmx(header) if header in (DAQMX, DIGITAL) else take.samples()
+            self.latest[path] = take.samples(header)
         self.active[path] = self.latest[path]
 
 
@@ -126,22 +120,18 @@ class _Cursor:
         fraction, seconds = (first, second) if self.order == "<" else (second, first)
         return moment(EPOCH, seconds, round(fraction / 2**64 * 1e6))
 
-    def samples(self) -> Samples:
+    def samples(self, header: int) -> Samples:
         kind, dimension, count = self.number("I"), self.number("I"), self.number("Q")
         if dimension != 1:
             raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 allows only one")
+        if header in (DAQMX, DIGITAL):
+            for _ in range(self.number("I")):
+                self.bytes(20 if header == DAQMX else 17)
+            widths = tuple(self.number("I") for _ in range(self.number("I")))
+            return Samples(DAQMX_RAW, count, 0, widths)
         if kind == STRING:
             return Samples(kind, count, self.number("Q"))
         return Samples(kind, count, count * SIZES[kind])
-
-    def daqmx(self, header: int) -> Samples:
-        _, dimension, count = self.number("I"), self.number("I"), self.number("Q")
-        if dimension != 1:
-            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 allows only one")
-        for _ in range(self.number("I")):
-            self.bytes(20 if header == DAQMX else 17)
-        widths = tuple(self.number("I") for _ in range(self.number("I")))
-        return Samples(DAQMX_RAW, count, 0, widths)
 
 
 def names(path: str) -> tuple[str, ...]:

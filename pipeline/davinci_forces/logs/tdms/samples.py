@@ -6,12 +6,12 @@ npTDMS reads channels that need a scale: raw values of DAQ cards, and scales des
 open file, never its path: it would trust an index file in the same folder, however old or damaged.
 """
 
-import io
 import logging
 import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from mmap import ACCESS_READ, mmap
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -217,28 +217,13 @@ def side_by_side(queues: Sequence[Queue], most: int = PIECE_ROWS) -> Iterator[tu
         yield block, lacking
 
 
-class Part(io.RawIOBase):
-    """The first `size` bytes of a file, for a reader that must not see the damage after them."""
-
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        self.file, self.size, self.at = file, size, 0
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Set the position, as files do."""
-        self.at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self.at, io.SEEK_END: self.size}[whence]
-        return self.at
-
-    def tell(self) -> int:
-        """Return the position."""
-        return self.at
+class Part(mmap):
+    """The first bytes of a file, for a reader that must not see the damage after them."""
 
     def readinto(self, buffer: Any) -> int:
         """Fill a buffer as far as there are bytes."""
-        room = memoryview(buffer).cast("B")
-        self.file.seek(self.at)
-        data = self.file.read(max(0, min(len(room), self.size - self.at)))
-        room[: len(data)] = data
-        self.at += len(data)
+        data = self.read(len(buffer))
+        buffer[: len(data)] = np.frombuffer(data, np.uint8)
         return len(data)
 
 
@@ -281,7 +266,7 @@ def scaled_pieces(file: BinaryIO, size: int, paths: Sequence[str], chunk: int) -
     from nptdms.log import log_manager
 
     log_manager.set_level(logging.ERROR)  # problems of the file are reported already
-    with TdmsFile.open(Part(file, size)) as opened:
+    with TdmsFile.open(Part(file.fileno(), size, access=ACCESS_READ)) as opened:
         name_of = {path: names(path) for path in paths}
         if chunk <= PIECE_ROWS:
             for part in opened.data_chunks():

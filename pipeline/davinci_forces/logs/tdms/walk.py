@@ -180,7 +180,8 @@ def _regions(
     if interleaved:
         yield from _interleaved(active, order, data, length)
         return
-    size = _chunk_size(active)
+    cards = {samples.widths: samples.count for samples in active.values() if samples.kind == DAQMX_RAW}
+    size = sum(samples.octets for samples in active.values()) + sum(sum(w) * count for w, count in cards.items())
     chunks, remainder = divmod(length, size) if size else (0, 0)
     counts = {path: samples.count for path, samples in active.items()}
     if chunks:
@@ -244,11 +245,6 @@ def _joined(region: Region, file_segments: int, stride: int) -> Region | None:
         columns = {path: replace(c, step=region.stride, count=region.records) for path, c in columns.items()}
     counts = {path: count * region.records for path, count in region.counts.items()}
     return Region(region.position, file_segments, stride, columns, counts)
-
-
-def _chunk_size(active: dict[str, Samples]) -> int:
-    cards = {samples.widths: samples.count for samples in active.values() if samples.kind == DAQMX_RAW}
-    return sum(samples.octets for samples in active.values()) + sum(sum(w) * count for w, count in cards.items())
 
 
 def _dtype(kind: int, order: str) -> np.dtype[Any] | None:

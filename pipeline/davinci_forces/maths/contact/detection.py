@@ -7,7 +7,11 @@ that level once in ten minutes; the level is at least the largest effort of free
 
 An onset is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
 
-    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
+    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
+
+A smoothed step has T = 0: it approaches both of its levels exponentially, with its steepest slope 1 / T_s in between.
+A push that rises like a squared sine begins T/4 before such a ramp.  Real pushes lie between the two, so the standard
+error of an onset contains, besides noise, the root mean square of what lies evenly between: T/4/sqrt(3).
 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
@@ -24,10 +28,13 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.windows import runs
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
+SHAPE = 0.25 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
+STEP_WIDTH = 2.0 * float(np.log(2.0))  # T_seen of a step, in T_s
 TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
 
@@ -62,6 +69,15 @@ def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
     return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(statistics, alarms, strict=True))
 
 
+def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
+    """The alarm level of an effort (N,) at `rate` [Hz] by the median of its `free` samples (N,).
+
+    It tells nothing of the few samples at which something may have touched the arm.
+    """
+    rms = SIGMA * float(np.median(np.abs(tau_ext[free])))
+    return alarm_level([free_motion_statistics(tau_ext, free, rate)._replace(rms=rms, largest=0.0)])
+
+
 def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:
     """Yield the contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
 
@@ -73,7 +89,11 @@ def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: flo
         if runs and is_one_contact(tau_ext * np.sign(tau_ext[start]), *runs[-1], start, stop):
             start = runs.pop()[0]
         runs.append((start, stop))
-    contacts = [event_between(t, tau_ext, std, *run, rise) for run in runs]
+    contacts = []
+    for start, stop in runs:
+        size = tau_ext * np.sign(tau_ext[start])
+        onset, release = (edge(t, size, std, start, stop, inwards, rise) for inwards in (1, -1))
+        contacts.append(Event(*onset, *release))
     for i in range(len(contacts) - 1):
         event, following = contacts[i], contacts[i + 1]
         if event.release > following.onset:
@@ -88,18 +108,11 @@ def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_sto
     return bool(size[stop:next_start].min(initial=smaller) > 0.5 * smaller > 0.0)
 
 
-def event_between(t: Array, tau_ext: Array, std: Array, start: int, stop: int, rise: float) -> Event:
-    """The contact whose effort (N,) is above the level from sample `start` to `stop`."""
-    size = tau_ext * np.sign(tau_ext[start])
-    return Event(*edge(t, size, std, start, stop, 1, rise), *edge(t, size, std, start, stop, -1, rise))
-
-
 def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
     """Yield start and stop of the runs of one sign (N,); runs of the same sign with a short gap are merged."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]])))
-    signed = [(int(a), int(b)) for a, b in pairwise(edges) if side[a] != 0.0]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]]))).tolist()
     merged: list[tuple[int, int]] = []
-    for a, b in signed:
+    for a, b in ((a, b) for a, b in pairwise(edges) if side[a] != 0.0):
         if merged and t[a] - t[merged[-1][1] - 1] <= MAX_GAP_CONTACT and side[a] == side[merged[-1][0]]:
             merged[-1] = (merged[-1][0], b)
         else:
@@ -110,11 +123,10 @@ def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
     """Onset (inwards 1) or release (-1) of a contact above the level from `start` to `stop`, and its standard error."""
     k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
-    middle = inner_crossing(t, size, k, inwards, 0.5 * peak)
-    upper, lower = inner_crossing(t, size, k, inwards, 0.75 * peak), outer_crossing(t, size, k, inwards, 0.25 * peak)
+    lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
     apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
-    duration = float(np.sqrt(max(apparent**2 - rise**2, 0.0)))
-    return middle - 0.5 * inwards * duration, float(std[k]) * apparent / peak
+    duration = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0)))
+    return middle - 0.5 * inwards * duration, float(np.hypot(std[k] * apparent / peak, SHAPE * duration))
 
 
 def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
@@ -179,7 +191,8 @@ def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
 
     If no run of free samples is that long, means are over the longest run; NaN without free samples.
     """
-    return _size([_moving_means(run, length) for run, length in _runs(tau_ext, free, length)])
+    sums = ((np.cumsum(np.concatenate([[0.0], run])), length) for run, length in _runs(tau_ext, free, length))
+    return _size([(total[length:] - total[:-length]) / length for total, length in sums])
 
 
 def largest_size(tau_ext: Array, free: Booleans, length: int) -> float:
@@ -197,8 +210,3 @@ def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]
 
 def _size(parts: list[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")
-
-
-def _moving_means(x: Array, length: int) -> Array:
-    sums = np.cumsum(np.concatenate([[0.0], x]))
-    return np.asarray((sums[length:] - sums[:-length]) / length)

@@ -62,7 +62,6 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     inside = np.einsum("ni,ni->n", e, np.linalg.solve(C, e[..., None])[..., 0]) <= limit
     parts = blocks(len(e))
     errors_of, covered = [e[part] for part in parts], [inside[part].astype(float)[:, None] for part in parts]
-    share = float(np.mean(inside))
     span = float(spans.mean())
     values = [(f(errors_of), standard_error(f, errors_of)) for f in (_rmse, _bias, _mean_rmse)]
     (rmse, rmse_std), (bias, bias_std), (typical, typical_std) = values
@@ -72,10 +71,9 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     worst = int(np.linalg.norm(e, axis=1).argmax())
     largest = float(np.linalg.norm(e[worst]))
     largest_std = float(np.sqrt(e[worst] @ C[worst] @ e[worst])) / (largest or 1.0)
-    return ForceErrors(
-        rmse, rmse_std, bias, bias_std, largest, largest_std, span, relative, relative_std, share,
-        standard_error(_bias, covered),
-    )  # fmt: skip
+    share, share_std = float(np.mean(inside)), standard_error(_bias, covered)
+    sizes = rmse, rmse_std, bias, bias_std, largest, largest_std
+    return ForceErrors(*sizes, span, relative, relative_std, share, share_std)
 
 
 class Lag(NamedTuple):

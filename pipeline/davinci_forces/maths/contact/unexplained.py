@@ -78,7 +78,6 @@ def unexplained_share(course: Course, references: Sequence[Course]) -> float:
     size = np.maximum(np.abs(Phi).max(axis=0), 1e-300)
     theta = np.linalg.lstsq(Phi / size, tau, rcond=None)[0] / size
     left = float((tau - Phi @ theta).std() / max(tau.std(), 1e-300))
-    share = float(
-        (course.tau - _regressor(course, speed) @ theta)[inside].std() / max(course.tau[inside].std(), 1e-300)
-    )
+    residual = (course.tau - _regressor(course, speed) @ theta)[inside]
+    share = float(residual.std() / max(course.tau[inside].std(), 1e-300))
     return share if share > 2 * left else 0.0

@@ -44,20 +44,14 @@ class Bands(NamedTuple):
     power: Array  # (B,) squares of the residuals
 
 
-class CorrelatedVariance(NamedTuple):
-    """The variance of parameters, and the number of lags over which the residuals are correlated."""
-
-    variance: Array  # (p,)
-    lags: float
-
-
 def correlated_variance(
     Q: Array, residual: Array, starts: tuple[int, ...], D: Array, degrees: int
-) -> CorrelatedVariance:
-    """Variance of D y for y = Q' tau, from orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
+) -> tuple[Array, float]:
+    """Variance (p,) of D y for y = Q' tau, from orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
 
     Each log is a period that begins at its entry of `starts`; `degrees` is K - p.  Larger residuals in one part of the
-    period increase the variance of the parameters that depend on this part.
+    period increase the variance of the parameters that depend on this part.  The second result is the number of lags
+    over which the residuals are correlated.
     """
     spectra = transform_logs(Q, residual, starts)
     bands = band_spectra(spectra)
@@ -67,7 +61,7 @@ def correlated_variance(
     covariance = np.einsum("b,bij->ij", mean, bands.basis)
     variance = np.einsum("ki,ij,kj->k", D, covariance, D)
     factor = unevenness(spectra, D, np.maximum(mean, SMALLEST), bands.frequency)
-    return CorrelatedVariance(variance * factor, float(share @ lags))
+    return variance * factor, float(share @ lags)
 
 
 def transform_logs(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:

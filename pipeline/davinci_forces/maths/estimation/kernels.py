@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.maths.compiled import compile_and_store, inline
+from davinci_forces.maths.compiled import compile_and_store, compile_function, inline
 
 BLOCK_ROWS = 512  # rows of a block, whose columns fit into the processor's nearest cache
 
@@ -71,6 +71,16 @@ def residual_squares(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> fl
     return total
 
 
+@compile_function
+def least(costs: Any) -> int:
+    """The index of the least cost; `argmin` would take a second to compile."""
+    first = 0
+    for s in range(1, len(costs)):
+        if costs[s] < costs[first]:
+            first = s
+    return first
+
+
 @compile_and_store
 def fly(
     x: Any, v: Any, best: Any, costs: Any, lower: Any, upper: Any, factors: Any, C: Any, y: Any, r: Any, w: Any,
@@ -82,9 +92,10 @@ def fly(
     to `history` (I,).
     """
     S, n = v.shape
-    monomials = np.empty(len(factors))
+    monomials, leader, first = np.empty(len(factors)), np.empty(n), least(costs)
     for k in range(len(w)):
-        leader = best[np.argmin(costs)].copy()
+        for i in range(n):
+            leader[i] = best[first, i]
         for s in range(S):
             for i in range(n):
                 towards = cognitive * r[k, s, i, 0] * (best[s, i] - x[s, i])
@@ -99,5 +110,7 @@ def fly(
             cost = residual_squares(x[s], factors, C, y, monomials)
             if cost < costs[s]:
                 costs[s] = cost
-                best[s] = x[s]
-        history[k] = costs.min()
+                for i in range(n):
+                    best[s, i] = x[s, i]
+        first = least(costs)
+        history[k] = costs[first]

@@ -31,16 +31,11 @@ from davinci_forces.maths.excitation.joint import (
     shrink_into_limits,
 )
 from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_into_arm_limits
-from davinci_forces.maths.excitation.search import ReportStart, ignore_start
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-JOINT_PARAMETERS = (
-    "rotor inertia",
-    "viscous friction",
-    "Coulomb friction",
-)  # parameters of each joint, after those of links
+JOINT_PARAMETERS = ("rotor inertia", "viscous friction", "Coulomb friction")  # of each joint, after those of links
 EXPLORED = 8  # random trajectories of a start, searched on few samples
 REFINED = 3  # the best of them, searched on all samples
 SAMPLES_EXPLORED = 16  # samples for each harmonic: eight in a period of the products of two harmonics
@@ -51,6 +46,7 @@ EXPLORATION, SELECTION = 2, 3  # stages before the best trajectories are chosen
 LBFGS_ITERATIONS = 60  # of L-BFGS in each stage
 STEP = 1e-6  # of the differences, relative to 1 rad or m: their error is 1e-10
 HUGE = 1e10  # of a motion without full rank
+ReportStart = Callable[[int, int, float], None]  # takes the number of a start, from 1, of all starts, and the optimum
 
 
 @dataclass(frozen=True)
@@ -141,9 +137,9 @@ def parameter_of(problem: ArmExcitationProblem, column: int) -> tuple[int | None
 
 
 def design_together(
-    problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart = ignore_start
+    problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
 ) -> ArmDesign:
-    """Design the trajectories of the best of several starts of the search.
+    """Design the trajectories of the best of several starts of the search; `report_start` reports each start.
 
     Raises
     ------
@@ -155,7 +151,8 @@ def design_together(
     designs = list[tuple[float, list[Fourier]]]()
     for start in range(starts):
         designs.append(_design(problem, np.random.default_rng([seed, start])))
-        report_start(start + 1, starts, designs[-1][0])
+        if report_start:
+            report_start(start + 1, starts, designs[-1][0])
     value, series = min(designs, key=lambda design: design[0])
     if not np.isfinite(value):
         raise ValueError("no trajectory of these harmonics within the limits identifies all base parameters of the arm")

@@ -5,7 +5,6 @@ R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,30 +18,16 @@ STEP_FACTORS = (0.5, 1.0)  # range of the factor of a difference between two can
 CROSSING = 0.9  # share of the variables that a step changes
 
 Objective = Callable[[Array], Array]  # the objective (S,) of S candidates (S, d)
-ReportStart = Callable[
-    [int, int, float], None
-]  # takes the number of a start, from 1, the number of starts, and the optimum
 
 
-class Optimum(NamedTuple):
-    """The best candidate (d,) of several starts, and the lowest value of each start (starts,)."""
+def minimise(objective: Objective, d: int, starts: int, seed: int) -> tuple[Array, Array]:
+    """Minimise from several starts: the best candidate (d,), and the lowest value of each start (starts,).
 
-    z: Array
-    values: Array
-
-
-def ignore_start(start: int, starts: int, value: float) -> None:
-    """Report nothing."""
-
-
-def minimise(objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart = ignore_start) -> Optimum:
-    """Minimise from several starts; the first ones are the same for any number of starts."""
-    optima = []
-    for start in range(starts):
-        optima.append(descend(objective, d, np.random.default_rng([seed, start])))
-        report_start(start + 1, starts, optima[-1][1])
+    The first starts are the same for any number of starts.
+    """
+    optima = [descend(objective, d, np.random.default_rng([seed, start])) for start in range(starts)]
     values = np.array([value for _, value in optima])
-    return Optimum(optima[int(values.argmin())][0], values)
+    return optima[int(values.argmin())][0], values
 
 
 def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[Array, float]:

@@ -81,10 +81,14 @@ def as_bodies(parameters: Array) -> Bodies:
     masses = parameters[:, 0]
     centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
     weightless = Bodies(masses, centres, np.zeros((len(masses), 3, 3)), np.zeros(len(masses), np.int64))
-    inertias = np.zeros((len(masses), 3, 3))
+    return replace(weightless, inertias=_tensors(parameters) - weightless.about_frames())
+
+
+def _tensors(parameters: Array) -> Array:
+    """The inertias (L, 3, 3) about the origins of the frames among inertial parameters (L, 10)."""
+    inertias = np.zeros((len(parameters), 3, 3))
     inertias[:, *_UPPER] = parameters[:, 4:]
-    inertias = inertias + np.triu(inertias, 1).swapaxes(1, 2)
-    return replace(weightless, inertias=inertias - weightless.about_frames())
+    return np.asarray(inertias + np.triu(inertias, 1).swapaxes(1, 2))
 
 
 def cylinder(mass: float, height: float, radius: float, axis: int) -> Array:
@@ -99,10 +103,7 @@ def pseudo_inertias(parameters: Array) -> Array:
     In a frame in which this frame has the pose T, it is T J T'.  Wensing, Kim and Slotine, Linear matrix inequalities
     for physically consistent inertial parameter identification, 2018.
     """
-    inertia = np.zeros((len(parameters), 3, 3))
-    inertia[:, *_UPPER] = parameters[:, 4:]
-    inertia = inertia + np.triu(inertia, 1).swapaxes(1, 2)
-    J = np.zeros((len(parameters), 4, 4))
+    inertia, J = _tensors(parameters), np.zeros((len(parameters), 4, 4))
     J[:, :3, :3] = np.trace(inertia, axis1=1, axis2=2)[:, None, None] / 2.0 * np.eye(3) - inertia
     J[:, :3, 3] = J[:, 3, :3] = parameters[:, 1:4]
     J[:, 3, 3] = parameters[:, 0]

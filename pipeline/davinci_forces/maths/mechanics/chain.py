@@ -98,9 +98,8 @@ def denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
 
     A link turns about z of its parent frame, and its own frame is at its far end.
     """
-    return _chain_of(
-        table, tip, [(np.eye(4), _screw(2, row.theta, row.d) @ _screw(0, row.alpha, row.a)) for row in table]
-    )
+    transforms = [(np.eye(4), _screw(2, row.theta, row.d) @ _screw(0, row.alpha, row.a)) for row in table]
+    return _chain_of(table, tip, transforms)
 
 
 def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
@@ -108,9 +107,8 @@ def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
 
     A link turns about z of its own frame.  Craig, Introduction to Robotics, section 3.4.
     """
-    return _chain_of(
-        table, tip, [(_screw(0, row.alpha, row.a) @ _screw(2, row.theta, row.d), np.eye(4)) for row in table]
-    )
+    transforms = [(_screw(0, row.alpha, row.a) @ _screw(2, row.theta, row.d), np.eye(4)) for row in table]
+    return _chain_of(table, tip, transforms)
 
 
 def _chain_of(table: Sequence[TableRow], tip: str, transforms: list[tuple[Array, Array]]) -> Chain:

@@ -23,9 +23,8 @@ def poses_of_bodies(chain: Chain, q: Array) -> Array:
     """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
     chain = chain.with_coordinates(q.shape[-1])
     moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
-    c, s = (
-        np.where(chain.slides, fixed, function(moved))[..., None] for fixed, function in ((1.0, np.cos), (0.0, np.sin))
-    )
+    turned = np.where(chain.slides, 0.0, moved)[..., None]
+    c, s = np.cos(turned), np.sin(turned)
     x, y, z, position = np.moveaxis(chain.placement, -1, 0)
     origin = position + np.where(chain.slides, moved, 0.0)[..., None] * z
     local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, origin.shape), origin], axis=-1)
@@ -89,8 +88,7 @@ def remote_centre(chain: Chain) -> Array:
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
-    v, w = (
-        J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3))
-    )  # v + w x p = 0 for both
+    # v + w x p = 0 for both
+    v, w = (J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

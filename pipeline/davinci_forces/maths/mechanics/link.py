@@ -125,12 +125,8 @@ def turned_inertia(cos_sin: CosSin, inertia: Inertia) -> Inertia:
     """Transform the inertia of a link that turns to the axes of its joint at q = 0."""
     (c, s), (h, (xx, xy, xz), (yy, yz, zz)) = cos_sin, inertia
     cc, cs, ss, cs_xy = c * c, c * s, s * s, 2.0 * c * s * xy
-    mixed = cs * (xx - yy) + (cc - ss) * xy
-    xx_xy_xz, yy_yz_zz = (
-        (cc * xx - cs_xy + ss * yy, mixed, c * xz - s * yz),
-        (ss * xx + cs_xy + cc * yy, s * xz + c * yz, zz),
-    )
-    return from_link_axes(cos_sin, h), xx_xy_xz, yy_yz_zz
+    xx_xy_xz = cc * xx - cs_xy + ss * yy, cs * (xx - yy) + (cc - ss) * xy, c * xz - s * yz
+    return from_link_axes(cos_sin, h), xx_xy_xz, (ss * xx + cs_xy + cc * yy, s * xz + c * yz, zz)
 
 
 def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:

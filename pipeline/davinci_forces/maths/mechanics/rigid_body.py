@@ -77,9 +77,7 @@ def energy(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> tuple[A
     q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
     pi = bodies.parameters(q.shape[-1]).reshape(-1, 10)
     T = poses_of_bodies(chain, q)[..., 1:, :, :]
-    moment = np.einsum("l,...li->...i", pi[:, 0], T[..., :3, 3]) + np.einsum(
-        "...lij,lj->...i", T[..., :3, :3], pi[:, 1:4]
-    )
+    moment = np.einsum("...lij,lj->...i", T[..., :3, :], np.column_stack([pi[:, 1:4], pi[:, 0]]))
     kinetic = np.einsum("...i,...ij,...j->...", dq, mass_matrix(chain, bodies, q), dq) / 2
     return np.asarray(kinetic), np.asarray(GRAVITY * moment @ np.array(chain.up))
 

@@ -11,9 +11,8 @@ from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
 
-FUNCTIONS: dict[
-    str, Callable[[Array, Array, Array | float], Array | float]
-] = {  # the functions in `bias`, of q, dq and z
+# The functions in `bias`, of q, dq and z.
+FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {
     "1": lambda q, dq, z: 1.0,
     "sin q": lambda q, dq, z: np.sin(q),
     "cos q": lambda q, dq, z: np.cos(q),

@@ -41,26 +41,19 @@ def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Boolea
     The deflection is 0 after each gap, and it is known after a travel of `RUN_IN` displacements.  A period is computed
     twice: the second time starts with the last deflection of the first.
     """
+    from davinci_forces.maths.models import kernels
+
     dq = motion.dq[:, joint]
     z, valid = np.empty(len(dq)), np.empty(len(dq), np.bool_)
     for samples in segments(motion.segment):
-        v, z_0 = np.ascontiguousarray(dq[samples]), 0.0
+        v = np.ascontiguousarray(dq[samples])
+        kernels.deflections(v, motion.T_s, x_0, 0.0, z[samples])
         if motion.periodic:
-            first = _run(v, motion.T_s, x_0, z_0)
-            z_0 = float(deflect(first[-1], v[-1], motion.T_s, x_0))
-        z[samples] = _run(v, motion.T_s, x_0, z_0)
+            last = float(deflect(z[samples][-1], v[-1], motion.T_s, x_0))
+            kernels.deflections(v, motion.T_s, x_0, last, z[samples])
         travel = np.cumsum(np.abs(v)) * motion.T_s
         valid[samples] = motion.periodic or travel >= RUN_IN * x_0
     return z, valid
-
-
-def _run(dq: Array, T_s: float, x_0: float, z: float) -> Array:
-    """Deflection at each sample (N,); z is the deflection at the first sample."""
-    from davinci_forces.maths.models import kernels
-
-    out = np.empty(len(dq))
-    kernels.deflections(dq, T_s, x_0, z, out)
-    return out
 
 
 class Piece(NamedTuple):

@@ -78,11 +78,6 @@ class Box(NamedTuple):
     lumping: Lumping
 
 
-def each_for_itself(n: int) -> Lumping:
-    """The lumping theta = x, for a search of the model parameters themselves."""
-    return Lumping(np.column_stack([np.arange(n), np.full((n, 2), n)]), np.eye(n))
-
-
 def reduced_parameters(
     chain: Chain, bodies: Bodies, joint: int, n: int = 3, drives: Drives | None = None
 ) -> dict[str, float]:

@@ -53,7 +53,7 @@ class Phases:
     @cached_property
     def on_them(self) -> bool:
         """Whether each sample falls on the phase after that of the previous sample."""
-        return len(self.t) >= self.K and on_phases(self.t, self.period, self.K)
+        return len(self.t) >= self.K and are_apart(self.t, self.period / self.K, ON_PHASE)
 
     @cached_property
     def bins(self) -> Integers:
@@ -103,11 +103,6 @@ def nearest(since: Array, period: float, K: int) -> Integers:
     bins = np.rint(elapsed_periods, out=elapsed_periods).astype(np.int64)
     bins[bins == K] = 0
     return bins
-
-
-def on_phases(t: Array, period: float, K: int) -> bool:
-    """Whether each sample falls on the phase after that of the previous sample."""
-    return are_apart(t, period / K, ON_PHASE)
 
 
 def average_rows(x: Array, K: int) -> Folded:

@@ -65,11 +65,8 @@ def _parts(N: int) -> Iterator[tuple[int, int]]:
 
 def _shorten(x: Array, match: Repetition) -> Repetition:
     """Replace the lag of a section by the shortest lag after which its two best periods repeat."""
-    lag, size = match.lag, round(PERIODS_SEARCHED * match.lag)
-    middle, best = (
-        round(match.best_start + match.lag),
-        x[:, match.best_start : match.best_start + 2 * round(match.lag) + 1],
-    )
+    lag, size, middle = match.lag, round(PERIODS_SEARCHED * match.lag), round(match.best_start + match.lag)
+    best = x[:, match.best_start : match.best_start + 2 * round(match.lag) + 1]
     while True:
         start = max(min(middle - size // 2, match.stop - size), match.start)
         shorter = _search(x[:, start : min(start + size, match.stop)])

@@ -72,19 +72,14 @@ def is_continuous(x: Array, lost: float) -> bool:
     whole = np.vander(s, POLYNOMIAL_ORDER + 1, increasing=True)
     broken = np.column_stack([whole, after, after * s])
     degrees = len(s) - broken.shape[1]
-    smooth, jumping = (_residual(basis, x) for basis in (whole, broken))
+    fits = [(basis, np.linalg.lstsq(basis, x.T, rcond=None)[0]) for basis in (whole, broken)]
+    smooth, jumping = (((x.T - basis @ c) ** 2).sum(axis=0) for basis, c in fits)  # residual squares (J,)
     noise = np.maximum(jumping / degrees, 1e-24 * np.maximum(x.var(axis=1), 1e-300))
     if np.any((smooth - jumping) / 2 / noise > fdtri(2, degrees, 1.0 - BREAK_PROBABILITY)):
         return False
-    c = np.linalg.lstsq(broken, x.T, rcond=None)[0]
+    _, c = fits[1]
     v_before, v_after = c[1], c[1] + c[POLYNOMIAL_ORDER + 2]
     # A joint that reverses in a gap may return to the same place, so its motion is no evidence.
     per_sample = np.where(v_before * v_after > 0, np.minimum(np.abs(v_before), np.abs(v_after)), 0.0) / REACH
     jump_std = np.sqrt(noise * np.linalg.inv(broken.T @ broken)[POLYNOMIAL_ORDER + 1, POLYNOMIAL_ORDER + 1])
     return bool(np.any(per_sample * min(lost, REACH) > MIN_TRAVEL * jump_std))
-
-
-def _residual(basis: Array, x: Array) -> Array:
-    """Residual sum of squares (J,) of each signal."""
-    c = np.linalg.lstsq(basis, x.T, rcond=None)[0]
-    return np.asarray(((x.T - basis @ c) ** 2).sum(axis=0))

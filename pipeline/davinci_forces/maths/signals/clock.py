@@ -156,9 +156,8 @@ def are_gaps(t: Array, T_s: float) -> Booleans:
 def distances(t: Array, at: Array) -> Array:
     """Time [s] from each time `at` (K,) to the nearest sample; the samples are at times `t` (N,)."""
     after = np.searchsorted(t, at)
-    return np.asarray(
-        np.minimum(np.abs(at - t[np.maximum(after - 1, 0)]), np.abs(t[np.minimum(after, len(t) - 1)] - at))
-    )
+    before = np.abs(at - t[np.maximum(after - 1, 0)])
+    return np.asarray(np.minimum(before, np.abs(t[np.minimum(after, len(t) - 1)] - at)))
 
 
 def are_missing(t: Array, at: Array, T_s: float) -> Booleans:
@@ -199,9 +198,9 @@ def flat_lowpass(x: Array, ratio: float) -> Array:
     """
     from scipy.signal import fftconvolve
 
-    h = half_width(ratio)
+    h, weights = half_width(ratio), taps(ratio)[:, None]
     padded = np.pad(x, ((h, h), (0, 0)), mode="reflect", reflect_type="odd")
-    return np.asarray(fftconvolve(padded, taps(ratio)[:, None], mode="valid", axes=0))
+    return np.asarray(fftconvolve(padded, weights, mode="valid", axes=0))
 
 
 def half_width(ratio: float) -> int:

@@ -87,14 +87,13 @@ def is_current(measured: Sequence[Array], others: Sequence[Sequence[Array]], mov
     `measured` (N,) each; `others`, blocks of as many columns; `moves`, the columns by which blocks are compared.
     """
     alike = [measured, *(block for block in others if all(_alike(measured[i], block[i]) for i in moves))]
-    return any(_is_larger(currents, block) for currents in alike for block in others)
 
+    def is_larger(currents: Sequence[Array], block: Sequence[Array]) -> bool:
+        pairs = [_proportion(x, y) for x, y in zip(currents, block, strict=True)]
+        larger = [cosine > MIN_COSINE and factor > MIN_RATIO_TORQUE for cosine, factor in pairs]
+        return sum(larger) >= min(2, len(pairs))
 
-def _is_larger(currents: Sequence[Array], block: Sequence[Array]) -> bool:
-    """Whether the columns of a block are proportional to these currents and several times as large."""
-    pairs = [_proportion(x, y) for x, y in zip(currents, block, strict=True)]
-    larger = [cosine > MIN_COSINE and factor > MIN_RATIO_TORQUE for cosine, factor in pairs]
-    return sum(larger) >= min(2, len(pairs))
+    return any(is_larger(currents, block) for currents in alike for block in others)
 
 
 def _alike(x: Array, y: Array) -> bool:
@@ -111,21 +110,18 @@ def _proportion(x: Array, y: Array) -> tuple[float, float]:
 def is_steady(velocity: Array) -> bool:
     """Whether a velocity (N,) stays at one level after another, as in recordings for friction.
 
-    Neighbouring samples are averaged, so that noise does not hide a level.
+    After most moving samples it then hardly changes for a short time.  Neighbouring samples are averaged, so that noise
+    does not hide a level.
     """
-    return steadiness(velocity) >= MIN_STEADY_SHARE
-
-
-def steadiness(velocity: Array) -> float:
-    """Share of the moving samples of a velocity (N,) after which it hardly changes for a short time."""
     N = len(velocity)
     width, lag = max(N // AVERAGED_PARTS, 1), max(N // STEADY_PARTS, 1)
     v = np.convolve(velocity, np.ones(width) / width, "valid")
     if len(v) <= 2 * lag or not v.any():
-        return 0.0
+        return False
     speed = np.abs(v[lag:])
     moves = speed > MIN_SPEED_SHARE * speed.max()
-    return float((np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * speed)[moves].mean()) if moves.any() else 0.0
+    is_level = (np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * speed)[moves]
+    return bool(moves.any() and is_level.mean() >= MIN_STEADY_SHARE)
 
 
 @dataclass
@@ -149,19 +145,15 @@ class Outline:
             self.most = max(self.most, float(values[finite].max()))
         self.finite += int(finite.sum())
         end = self.samples + len(values)
-        while end > 2 * self.width * self.bin_size:
-            self._halve()
+        while end > 2 * self.width * self.bin_size:  # join bins in pairs, which doubles their length
+            pairs = (self._sums, self._counts)
+            self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
+            self.bin_size *= 2
         needed = -(-end // self.bin_size)
         number = np.arange(self.samples, end) // self.bin_size
         self._sums = _grown(self._sums, needed) + np.bincount(number, np.where(finite, values, 0.0), minlength=needed)
         self._counts = _grown(self._counts, needed) + np.bincount(number, finite, minlength=needed)
         self.samples = end
-
-    def _halve(self) -> None:
-        """Join bins in pairs, which doubles their length."""
-        pairs = (self._sums, self._counts)
-        self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
-        self.bin_size *= 2
 
     @property
     def mean(self) -> float:

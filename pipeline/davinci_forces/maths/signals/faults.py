@@ -31,7 +31,8 @@ class Stuck(NamedTuple):
 def find_stuck(t: Array, x: Array) -> list[Stuck]:
     """Find where a signal (N,) at times (N,) [s] repeats a value and then jumps, unlike a joint that was at rest."""
     step = np.abs(np.diff(x))
-    still = [(a, b) for a, b in repeated_runs(step == 0.0) if t[b] - t[a] >= MIN_TIME_STUCK and b < len(step)]
+    repeats = [(run.start, run.stop) for run in runs(step == 0.0)]  # first and last sample at one value
+    still = [(a, b) for a, b in repeats if t[b] - t[a] >= MIN_TIME_STUCK and b < len(step)]
     moving = step[step > 0.0] if still else step[:0]
     if not len(moving):
         return []
@@ -44,12 +45,9 @@ def find_stuck(t: Array, x: Array) -> list[Stuck]:
 
 def count_saturated(x: Array) -> int:
     """Count the samples of a signal (N,) in runs of several exactly at its largest or its smallest value."""
-    return sum(
-        b - a + 1
-        for level in (x.max(), x.min())
-        for a, b in repeated_runs((x[:-1] == level) & (x[1:] == level))
-        if b - a + 1 >= MIN_SAMPLES_SATURATED and level != 0.0
-    )
+    levels = [level for level in (x.max(), x.min()) if level != 0.0]
+    lengths = [run.stop - run.start for level in levels for run in runs(x == level)]
+    return sum(length for length in lengths if length >= MIN_SAMPLES_SATURATED)
 
 
 def beyond_steps(residual: Array, scored: Booleans, slack: Array, width: int) -> Booleans:
@@ -70,8 +68,3 @@ def beyond_steps(residual: Array, scored: Booleans, slack: Array, width: int) ->
         beyond[: k[:n][steps[:n]].max(initial=-width) + width] = True
         beyond[k[-n:][steps[-n:]].min(initial=len(residual) + width) - width :] = True
     return beyond
-
-
-def repeated_runs(same: Booleans) -> list[tuple[int, int]]:
-    """First and last sample of each run of equal samples; `same` (N-1,) is whether a sample equals the next one."""
-    return [(run.start, run.stop) for run in runs(same)]

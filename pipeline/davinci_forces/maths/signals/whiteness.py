@@ -71,7 +71,10 @@ def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     from scipy.fft import rfft
     from scipy.stats import kstwo
 
-    several = [_ordinates(np.asarray(rfft(x)), len(x)) for x in pieces if len(x) > 2]
+    several = []
+    for x in (x for x in pieces if len(x) > 2):
+        inner = np.asarray(rfft(x))[1 : (len(x) - 1) // 2 + 1]
+        several.append((np.arange(1, len(inner) + 1) / len(x), (inner.real**2 + inner.imag**2) / len(x)))
     frequency, ordinate = several[0]
     if len(several) > 1:
         frequency, ordinate = (np.concatenate(columns) for columns in zip(*several, strict=True))
@@ -83,11 +86,6 @@ def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     above = share[:-1] - step * np.arange(q - 1)  # a step of the straight line's samples lower, and higher
     distance = float(max(above.max(), step - above.min()))
     return Cumulative(frequency, share, distance, float(kstwo.sf(distance, q - 1)))
-
-
-def _ordinates(X: Array, length: int) -> tuple[Array, Array]:
-    inner = X[1 : (length - 1) // 2 + 1]
-    return np.arange(1, len(inner) + 1) / length, (inner.real**2 + inner.imag**2) / length
 
 
 def distance_of(probability: float, ordinates: int) -> float:

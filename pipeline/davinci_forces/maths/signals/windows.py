@@ -63,9 +63,4 @@ def longest_run(t: Array, rate: float) -> slice:
 
 def unbroken(t: Array, gap: float) -> list[slice]:
     """Split the times (N,) into runs that are no more than `gap` [s] apart."""
-    return list(segments(segment_numbers(t, gap)))
-
-
-def segment_numbers(t: Array, gap: float) -> Integers:
-    """Number the runs of times (N,) that are no more than `gap` [s] apart."""
-    return np.asarray(np.cumsum(np.diff(t, prepend=t[:1]) > gap))
+    return list(segments(np.cumsum(np.diff(t, prepend=t[:1]) > gap)))

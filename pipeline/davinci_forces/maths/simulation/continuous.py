@@ -3,14 +3,14 @@
 The solver is implicit because the wrist has small inertias and high gains: explicit steps would take microseconds.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compile_and_store
-from davinci_forces.maths.simulation import closed_loop as arms
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics.kernels import mass_and_bias
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import Plant
 from davinci_forces.maths.simulation.control import lyapunov
@@ -37,45 +37,27 @@ def regulate(
     (n,) is the friction.  The samples are the solver's steps, so that V is not interpolated.  (5.8), (5.9), (5.17)
     """
     n = len(q)
-    M, tau, b = np.empty((n, n)), np.empty(n), np.empty(n)
+    M, b, G, rest = np.empty((n, n)), np.empty(n), np.empty(n), np.zeros(n)
+
+    def effort(q: Array, dq: Array, integral: Array) -> Array:
+        """The controller's effort (n,); M and b are filled with the arm's inertia and bias.  (5.17)"""
+        mass_and_bias(model.data.tree, GRAVITY, q, rest, rest, M, G)  # G is the gravity that the compensation assumes
+        mass_and_bias(plant.data.tree, GRAVITY, q, dq, rest, M, b)
+        return law.proportional * (target - q) - law.derivative * dq + law.gravity * G + law.integral * integral
 
     def slope(_: float, state: Array) -> Array:
-        rate = np.empty(3 * n)
-        _slope(plant.data, model.data, law, target, viscous, np.ascontiguousarray(state), M, tau, b, rate)
-        return rate
+        """The time derivative of a state (3 n,): position, velocity, integral of the error.  (4.28)"""
+        q, dq, integral = np.ascontiguousarray(state).reshape(3, n)
+        tau = effort(q, dq, integral)
+        return np.concatenate([dq, np.linalg.solve(M + inertia, tau - b - viscous * dq), target - q])
 
-    start = np.concatenate([q, np.zeros(2 * n)])
+    start, inertia = np.concatenate([q, np.zeros(2 * n)]), np.diag(plant.data.rotors)
     solution = solve_ivp(slope, (0.0, duration), start, method="Radau", rtol=RELATIVE, atol=ABSOLUTE)
     if not solution.success:
         raise ArithmeticError(f"the solver stopped at {solution.t[-1]:g} s: {solution.message}")
-    q_t, dq_t = solution.y[:n].T, solution.y[n : 2 * n].T
-    V, efforts = np.empty(len(q_t)), np.empty(q_t.shape)
-    for k, state in enumerate(solution.y.T):
-        _forces(plant.data, model.data, law, target, np.ascontiguousarray(state), M, tau, b)
-        V[k] = lyapunov(M, dq_t[k], law.proportional, target - q_t[k])
-        efforts[k] = tau
-    return Regulated(solution.t, q_t, dq_t, efforts, V)
-
-
-@compile_and_store
-def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, tau: Any, b: Any) -> None:
-    """Fill inertia M, controller effort tau and bias b at a state (3 n,): position, velocity, integral of the error."""
-    n = len(target)
-    q, dq = state[:n], state[n : 2 * n]
-    arms.dynamics(model, q, model.rest, M, b)  # b is now the gravity that the compensation assumes
-    error = target - q
-    tau[:] = law.proportional * error - law.derivative * dq + law.gravity * b + law.integral * state[2 * n :]  # (5.17)
-    arms.dynamics(body, q, dq, M, b)
-
-
-@compile_and_store
-def _slope(
-    body: Any, model: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
-) -> None:
-    """Fill the time derivative of a state.  (4.28)"""
-    n = len(target)
-    _forces(body, model, law, target, state, M, tau, b)
-    dq = state[n : 2 * n]
-    rate[:n] = dq
-    rate[n : 2 * n] = np.linalg.solve(M, tau - b - viscous * dq)
-    rate[2 * n :] = target - state[:n]
+    states = solution.y.T.reshape(-1, 3, n).copy()
+    V, efforts = np.empty(len(states)), np.empty((len(states), n))
+    for k, state in enumerate(states):
+        efforts[k] = effort(*state)
+        V[k] = lyapunov(M + inertia, state[1], law.proportional, target - state[0])
+    return Regulated(solution.t, states[:, 0], states[:, 1], efforts, V)

@@ -71,7 +71,7 @@ def read(motors: Any, q: Any, angle: Any) -> None:
     for j in range(len(q)):
         angle[j] = motors.gear_ratio[j] * q[j]
         if motors.encoder_step[j] > 0:
-            angle[j] = motors.encoder_step[j] * np.round(angle[j] / motors.encoder_step[j])
+            angle[j] = motors.encoder_step[j] * np.rint(angle[j] / motors.encoder_step[j])
 
 
 def lyapunov(M: Array, dq: Array, proportional: Array, error: Array) -> float:

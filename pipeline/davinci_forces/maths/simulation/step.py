@@ -50,7 +50,8 @@ def level(friction: Friction, i: int, v: float) -> float:
     up = v >= 0.0
     c = friction.coulomb_up[i] if up else friction.coulomb_down[i]
     s = friction.static_up[i] if up else friction.static_down[i]
-    return float(c + (s - c) * np.exp(-((v / friction.stribeck_velocity[i]) ** 2)))
+    ratio = v / friction.stribeck_velocity[i]
+    return float(c + (s - c) * np.exp(-(ratio * ratio)))
 
 
 @compile_function
@@ -101,24 +102,23 @@ def step(
     effort.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is set to this
     stop with zero velocity, as in Simulink's second-order integrator (section 4.5).
     """
-    q, dq, z, before = state
+    q, dq, z, before = state.q, state.dq, state.z, state.before
     n = len(q)
-    A, r, new = np.empty((n, n)), np.empty(n), np.empty(n)
-    up, down, decay, free = np.zeros(n), np.zeros(n), np.ones(n), np.empty(n, np.bool_)
+    A, rows = np.zeros((n, n)), np.zeros((7, n))
+    r, new, up, down, decay, free, side = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
     for i in range(n):
-        r[i], new[i], free[i] = h * (tau[i] - b[i]), dq[i], moving[i]
+        r[i], new[i], decay[i], free[i] = h * (tau[i] - b[i]), dq[i], 1.0, moving[i]
         for j in range(n):
             A[i, j] = M[i, j]
             r[i] += M[i, j] * dq[j]
     _add_friction(friction, dq, z, h, A, r, up, down, decay)
-    side = np.zeros(n)
     for _ in range(n + 1):  # each iteration may stop one more joint
         _velocity(A, r, up, down, free, new)
         hit = False
         for i in range(n):
             end = q[i] + h / 2 * (dq[i] + new[i])
             if free[i] and (end > upper[i] or end < lower[i]):
-                side[i], free[i], hit = 1.0 if end > upper[i] else -1.0, False, True
+                side[i], free[i], hit = 1.0 if end > upper[i] else -1.0, 0.0, True
         if not hit:
             break
     for i in range(n):

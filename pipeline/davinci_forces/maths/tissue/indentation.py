@@ -87,7 +87,7 @@ def onset_std(depth: Array, force: Array, bend: Hinge) -> float:
     if np.abs(np.diag(R)).min() <= 1e-12 * np.abs(np.diag(R)).max() or len(depth) <= 4:
         return float("nan")
     residual = residual - Q @ (Q.T @ residual)
-    variance = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3).variance
+    variance, _ = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3)
     return float(np.sqrt(variance[2]))
 
 
@@ -162,11 +162,6 @@ def bends(bend: Hinge) -> bool:
     return bend.before >= MIN_SAMPLES_ONSET and bend.squares_line > MIN_RATIO_BEND * bend.squares
 
 
-def into_tissue(depth: Array, force: Array) -> float:
-    """The sign that makes depths (N,) grow into the tissue: -1 if the force clearly bends as depths shrink, else 1."""
-    return -1.0 if hinge(-depth, force).squares * MIN_RATIO_BEND < hinge(depth, force).squares else 1.0
-
-
 class StraightLine(NamedTuple):
     """f = c + k d, by least squares."""
 
@@ -190,10 +185,9 @@ def straight(depth: Array, force: Array) -> StraightLine | None:
     away = float(np.sum((force - force.mean()) ** 2))
     if not away > 0:
         return StraightLine(0.0, 0.0, float(c), 0.0)
-    variance = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2).variance
-    return StraightLine(
-        float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away
-    )
+    variance, _ = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2)
+    r2 = 1.0 - float(residual @ residual) / away
+    return StraightLine(float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), r2)
 
 
 def slope_with_std(depth: Array, force: Array, common: float) -> tuple[float, float]:

@@ -28,10 +28,10 @@ MIN_EARLY_RISE = 0.05  # share of the force within the first quarter of the dept
 MAX_NAMED = 5  # largest number of pushes that a remark names
 
 
-def between_troughs(x: Array, rises: float = MIN_PROMINENCE) -> list[slice]:
+def between_troughs(x: Array) -> list[slice]:
     """Split a signal (N,) into swings, each from the lowest sample before a peak to the lowest after it.
 
-    The prominence of a peak is at least `rises` of the signal's range, without the extreme 1 % of its samples.  A peak
+    The prominence of a peak is at least a share of the signal's range, without the extreme 1 % of its samples.  A peak
     at an end of the signal counts.
     """
     from scipy.signal import find_peaks
@@ -40,7 +40,7 @@ def between_troughs(x: Array, rises: float = MIN_PROMINENCE) -> list[slice]:
     if not high > low:
         return [slice(0, len(x))]
     padded = np.concatenate([[x.min()], x, [x.min()]])
-    peaks = find_peaks(padded, prominence=rises * (high - low))[0] - 1
+    peaks = find_peaks(padded, prominence=MIN_PROMINENCE * (high - low))[0] - 1
     troughs = [a + int(np.argmin(x[a : b + 1])) for a, b in pairwise(peaks)]
     return [slice(a, b) for a, b in pairwise([0, *troughs, len(x)]) if b > a]
 
@@ -107,8 +107,10 @@ def orient_into_tissue(probing: Probing) -> Probing:
     if depth.shape[1] > 1:
         low, middle, high = np.quantile(force, [0.01, 0.5, 0.99])
         return probing._replace(force=-probing.force) if middle - low > MIN_RATIO_SIDES * (high - middle) else probing
-    sign = indentation.into_tissue(depth[:, 0], force)
-    return probing._replace(depth=sign * probing.depth, force=sign * probing.force)
+    inwards, outwards = (indentation.hinge(sign * depth[:, 0], force).squares for sign in (1.0, -1.0))
+    if outwards * indentation.MIN_RATIO_BEND < inwards:  # the force clearly bends as depths shrink
+        return probing._replace(depth=-probing.depth, force=-probing.force)
+    return probing
 
 
 def parts(probing: Probing, windows: Sequence[tuple[float, float]]) -> list[slice]:

@@ -34,9 +34,7 @@ def day_offset(t: Array, residual: Array, windows: Sequence[tuple[float, float]]
     inside = residual[~is_outside(t, windows)]
     if len(inside) < 2:
         return DayOffset(0.0, 0.0, 0.0, 0.0)
-    halves = np.array_split(inside, 2)
-    (first, first_std), (last, last_std) = (_mean(half) for half in halves)
-    value, std = _mean(inside)
+    (first, first_std), (last, last_std), (value, std) = map(_mean, (*np.array_split(inside, 2), inside))
     return DayOffset(value, std, last - first, float(np.hypot(first_std, last_std)))
 
 

@@ -94,7 +94,10 @@ def calibrate(data: FreeErrors) -> Calibration:
     trust /= trust + SHRINKAGE
     factor = np.exp(trust * by_range + (1.0 - trust) * overall) / NORMAL_95
     widening = students_95(LOG_BLOCKS * len(np.unique(data.source))) / NORMAL_95
-    return Calibration(edges, factor, widening**2 * v, spread_of_units(size, data.unit))
+    # The standard error of the logarithm of the quantile, from its spread over units; NaN for one unit.
+    logs = [np.log(np.quantile(size[data.unit == number], TYPICAL_SHARE)) for number in np.unique(data.unit)]
+    spread = float(np.std(logs, ddof=1) / len(logs) ** 0.5) if len(logs) > 1 else float("nan")
+    return Calibration(edges, factor, widening**2 * v, spread)
 
 
 def weighted_quantile(x: Array, weight: Array, share: float) -> float:
@@ -109,12 +112,6 @@ def students_95(degrees: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 0.5 + 0.5 * TYPICAL_SHARE))
-
-
-def spread_of_units(size: Array, unit: Integers) -> float:
-    """Standard error of the logarithm of the quantile of sizes (C,), from its spread over units; NaN for one unit."""
-    logs = [np.log(np.quantile(size[unit == number], TYPICAL_SHARE)) for number in np.unique(unit)]
-    return float(np.std(logs, ddof=1) / len(logs) ** 0.5) if len(logs) > 1 else float("nan")
 
 
 def count_uncorrelated(x: Array) -> float:

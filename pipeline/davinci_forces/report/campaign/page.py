@@ -68,12 +68,15 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
         yield Verdict("info", f"Left out, as they have no results: {names}. Run `davinci-forces all` on them.")
-    changes = (series for series in findings.every if series_key(series) in {*findings.slopes, *findings.varying})
-    messages = tuple(change_in_words(series, findings) for series in changes)
-    messages += tuple(text for series in findings.every for text in outliers_in_words(series, findings))
+    changes = [series for series in findings.every if series_key(series) in {*findings.slopes, *findings.varying}]
+    messages = [change_in_words(series, findings) for series in changes]
+    for series in findings.every:
+        for i in findings.stand_out(series):
+            shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
+            messages.append(f"{series.studies[i].link} stands out: **{where(series)}** is {literal(str(shown))}.")
     if messages:
         yield Verdict("warn", "**Beyond standard errors:**")
-        yield Bullets(messages)
+        yield Bullets(tuple(messages))
     else:
         yield Verdict("good", "No number drifts, varies or stands out beyond its standard errors.")
     for i, (robot, same) in enumerate(by_robot(studies).items()):
@@ -91,13 +94,6 @@ def change_in_words(series: Series, findings: Findings) -> str:
         slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
-
-
-def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
-    """State the studies that stand out."""
-    for i in findings.stand_out(series):
-        shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
-        yield f"{series.studies[i].link} stands out: **{where(series)}** is {literal(str(shown))}."
 
 
 def where(series: Series) -> str:
@@ -150,30 +146,19 @@ def joint_section(
 
 
 def table(
-    joint: str,
-    content: str,
-    label: str,
-    names: Sequence[str],
-    of_joint: Sequence[Series],
+    joint: str, content: str, label: str, names: Sequence[str], of_joint: Sequence[Series],
     studies: Sequence[CampaignStudy],
-) -> Table:
+) -> Table:  # fmt: skip
     """Some numbers of a joint, one row a study."""
     keys = {(s.name, study.name): key for s in of_joint for study, key in zip(s.studies, s.keys, strict=True)}
-    verdict = label.endswith("floors")
-    rows = tuple(
-        (
-            date(study),
-            study.link,
-            *([word(study, joint)] if verdict else []),
-            *(cell(study, keys.get((name, study.name))) for name in names),
-        )
-        for study in studies
-        if joint in study.joints
-    )
+    verdict, rows = label.endswith("floors"), []
+    for study in (study for study in studies if joint in study.joints):
+        numbers = (cell(study, keys.get((name, study.name))) for name in names)
+        rows.append((date(study), study.link, *([word(study, joint)] if verdict else []), *numbers))
     heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
     header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
     align = ("lll" if verdict else "ll") + "r" * len(names)
-    return Table(f"{title(joint)}: {content}, in every study.", header, rows, f"campaign-{label}", align)
+    return Table(f"{title(joint)}: {content}, in every study.", header, tuple(rows), f"campaign-{label}", align)
 
 
 def words(name: str) -> str:

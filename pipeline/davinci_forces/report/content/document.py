@@ -90,9 +90,8 @@ class Table:
 class Figure:
     """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
 
-    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A `small` one takes at most 3 kB
-    of the HTML: its lines are drawn in few points, without axes, and their numbers do not come along.  A mark of very
-    many samples is thinned at once, or the figures of long logs would hold all of them.
+    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A mark of very many samples is
+    thinned at once, or the figures of long logs would hold all of them.
     """
 
     caption: str
@@ -102,12 +101,9 @@ class Figure:
     zoomable: bool = False
     columns: int = 1
     height: float = 48.0
-    small: bool = False
     samples: int = field(init=False)  # points of all marks before thinning
 
     def __post_init__(self) -> None:
-        if self.small and self.zoomable:
-            raise ValueError(f"figure {self.caption!r}: a small figure has not the samples to zoom into")
         object.__setattr__(self, "samples", sum(points_of(mark) for panel in self.panels for mark in panel.marks))
         object.__setattr__(self, "panels", tuple(_held(panel) for panel in self.panels))
 

@@ -168,10 +168,8 @@ def _column(head: str, align: str, cells: tuple[Cell, ...]) -> TextColumn:
     unit = numbers[0].unit if len({number.unit for number in numbers}) == 1 else ""
     head = f"{head} {literal(f'[{unit}]').replace(' ', NO_BREAK)}".strip() if unit else head
     align = align.strip() or ("r" if numbers else "l")
-    return TextColumn(head, align, tuple(_text_cell(cell, bool(unit)) for cell in cells))
-
-
-def _text_cell(cell: Cell, unit_in_head: bool) -> TextCell:
-    if isinstance(cell, str):
-        return TextCell(cell)
-    return TextCell(literal(cell.text if unit_in_head else str(cell)), cell.key or "")
+    texts = (
+        TextCell(cell) if isinstance(cell, str) else TextCell(literal(cell.text if unit else str(cell)), cell.key or "")
+        for cell in cells
+    )
+    return TextColumn(head, align, tuple(texts))

@@ -116,12 +116,9 @@ class Bars:
     heights: Array
     label: str = ""
     colour: Colour = ""
-    std: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "heights", _column(self.heights))
-        if self.std is not None:
-            object.__setattr__(self, "std", np.broadcast_to(_column(self.std), self.heights.shape))
         if self.heights.shape != (len(self.names),):
             raise ValueError(f"Bars: {len(self.names)} names need as many heights, not {self.heights.shape}")
 

@@ -22,7 +22,10 @@ def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
         starts = _range_starts(mark.x, limit // 2)
         lower, upper = np.fmin.reduceat(mark.lower, starts), np.fmax.reduceat(mark.upper, starts)
         return replace(mark, x=mark.x[starts], lower=lower, upper=upper)
-    kept = _kept_indices(mark.x, mark.y, limit)
+    if is_sorted(mark.x):
+        kept = envelope(mark.x, mark.y, limit // 2)
+    else:
+        kept = np.arange(0, len(mark.x), -(-len(mark.x) // limit))
     columns: dict[str, Any] = {"x": mark.x[kept], "y": mark.y[kept]}
     if isinstance(mark, Points) and mark.y_std is not None:
         columns["y_std"] = mark.y_std[kept]
@@ -53,12 +56,6 @@ def _range_starts(x: Array, bins: int) -> Indices:
     """The first sample of each of the equal ranges of x that contain samples."""
     ranges = np.minimum((x - x[0]) / ((x[-1] - x[0]) or 1.0) * bins, bins - 1).astype(int)
     return np.flatnonzero(np.diff(ranges, prepend=-1))
-
-
-def _kept_indices(x: Array, y: Array, limit: int) -> Indices:
-    if is_sorted(x):
-        return envelope(x, y, limit // 2)
-    return np.arange(0, len(x), -(-len(x) // limit))
 
 
 def is_sorted(x: Array) -> bool:

@@ -120,16 +120,12 @@ def draw_mark(mark: AnyMark, frame: Frame) -> tuple[str, str]:
 
 def draw_points(mark: Points, frame: Frame) -> str:
     """Symbols with error bars and names."""
-    colour, x, y = COLOURS[mark.colour], frame.place_x(mark.x), frame.place_y(mark.y)
-    svg = (
-        ""
-        if mark.y_std is None
-        else error_bars(x, frame.place_y(mark.y - mark.y_std), frame.place_y(mark.y + mark.y_std), colour)
-    )
+    colour, x, y, svg = COLOURS[mark.colour], frame.place_x(mark.x), frame.place_y(mark.y), ""
+    if mark.y_std is not None:
+        svg = error_bars(x, frame.place_y(mark.y - mark.y_std), frame.place_y(mark.y + mark.y_std), colour)
     svg += path(symbols(x, y), dots(colour))
-    far = (
-        frame.left + 0.88 * frame.width
-    )  # beyond it a name stands to the left; above a point it would squeeze the curve
+    # Beyond it a name stands to the left; above a point it would squeeze the curve.
+    far = frame.left + 0.88 * frame.width
     for a, b, name in zip(x.tolist(), y.tolist(), mark.names, strict=False):
         shift, anchor = (-BESIDE, "end") if a > far else (BESIDE, "start")
         svg += words(a + shift, b + 0.35 * SMALL_SIZE, name, colour, SMALL_SIZE, anchor)
@@ -161,14 +157,9 @@ def draw_bars(bars: Sequence[Bars], frame: Frame) -> str:
     svg, width = "", BARS_WIDTH / max(len(bars), 1)
     for i, mark in enumerate(bars):
         middle = np.arange(len(mark.names), dtype=np.float64) + (i - (len(bars) - 1) / 2) * width
-        half = BAR_SHARE * width / 2
-        boxes = (
-            frame.box(x - half, x + half, 0.0, y) for x, y in zip(middle.tolist(), mark.heights.tolist(), strict=True)
-        )
+        half, tops = BAR_SHARE * width / 2, zip(middle.tolist(), mark.heights.tolist(), strict=True)
+        boxes = (frame.box(x - half, x + half, 0.0, y) for x, y in tops)
         svg += path("".join(boxes), fill(COLOURS[mark.colour], 1.0))
-        if mark.std is not None:
-            ends = frame.place_y(mark.heights - mark.std), frame.place_y(mark.heights + mark.std)
-            svg += error_bars(frame.place_x(middle), *ends, WORDS)
     return svg
 
 

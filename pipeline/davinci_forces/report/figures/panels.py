@@ -181,13 +181,10 @@ def _up(panel: Panel, height: float) -> Axis:
     columns = [y for mark in panel.marks for y in _extent(mark)[1]]
     names = any(isinstance(mark, Points) and mark.names for mark in panel.marks)
     margin = Y_MARGIN + (0.5 * NAME / max(height - ROW_ABOVE - ABOUT / 2, 4.0 * NAME) if names else 0.0)
-    stands = any(isinstance(mark, Bars | Histogram) for mark in panel.marks) and all(_least(y) >= 0 for y in columns)
+    stands = any(isinstance(mark, Bars | Histogram) for mark in panel.marks)
+    stands = stands and all(np.nanmin(y, initial=0.0) >= 0 for y in columns)
     axis = axis_over(columns, (0.0 if stands else margin, margin), panel.y_log, label).with_numbers(Y_STEPS)
     return replace(axis, label=wrap_label(" ".join(axis.label.split()), height - ABOUT))
-
-
-def _least(x: Array) -> float:
-    return float(np.nanmin(x, initial=0.0))
 
 
 def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
@@ -203,8 +200,7 @@ def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
         case Histogram():
             return [mark.edges], [mark.counts, np.zeros(1)]
         case Bars():
-            std = 0.0 if mark.std is None else mark.std
-            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights - std, mark.heights + std, np.zeros(1)]
+            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights, np.zeros(1)]
         case Line():
             return [mark.x], [mark.y]
         case HLine():

@@ -54,9 +54,9 @@ def symbols(x: Array, y: Array) -> str:
     return "".join(f"M{a:g} {b:g}h.1" for a, b in places.tolist())
 
 
-def path(d: str, style: str, clip: str = "") -> str:
+def path(d: str, style: str) -> str:
     """A path element with a style; nothing for an empty path."""
-    return f'<path d="{d}" style="{style}"{clip}/>' if d else ""
+    return f'<path d="{d}" style="{style}"/>' if d else ""
 
 
 def words(

@@ -136,7 +136,6 @@ def draw_heading(
             x, y = start, y + LINE_HEIGHT * (len(rows) if heading.columns == 1 else 1)
     top = bottom - 1.0 - LINE_HEIGHT * (len(titles) - 0.5) if heading.across else top
     for i, row in enumerate(titles):
-        svg += words(
-            left * POINT, (top + i * LINE_HEIGHT) * POINT + BASELINE * TITLE_SIZE, row, WORDS, TITLE_SIZE, bold=True
-        )
+        below = (top + i * LINE_HEIGHT) * POINT + BASELINE * TITLE_SIZE
+        svg += words(left * POINT, below, row, WORDS, TITLE_SIZE, bold=True)
     return svg

@@ -13,31 +13,12 @@ from davinci_forces.report.context import Context
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "report": (
         "Contact forces without a force sensor",
-        (
-            "summary",
-            "baseline",
-            "contacts",
-            "tip",
-            "sensor",
-            "tissue",
-            "stability",
-            "haptics",
-            "weight",
-            "joints",
-            "choice",
-            "prediction",
-            "noise",
-            "filters",
-            "runs",
-            "innovations",
-            "ground_truth",
-            "methods",
-            "provenance",
-            "review",
-        ),
+        ("summary", "baseline", "contacts", "tip", "sensor", "tissue", "stability", "haptics", "weight", "joints",
+         "choice", "prediction", "noise", "filters", "runs", "innovations", "ground_truth", "methods", "provenance",
+         "review"),
     ),
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation", "thesis")),
-}
+}  # fmt: skip
 SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)
 
 

@@ -53,15 +53,10 @@ def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
         (literal(c.key), before_text(c), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
         for c in changed[:MAX_ROWS]
     )
-    changes = (
-        f"The {MAX_ROWS} largest of {len(changed)} changes"
-        if len(changed) > MAX_ROWS
-        else count(len(changed), "change")
-    )
-    whole = Table(
-        f"{changes} since the baseline, the largest first: values a and b, and b minus a over its standard error.",
-        ("Number", "a, the baseline", "b, now", "Standard errors"), rows, "baseline-changes", "lrrr",
-    )  # fmt: skip
+    which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")
+    caption = f"{which} since the baseline, the largest first: values a and b, and b minus a over its standard error."
+    header = ("Number", "a, the baseline", "b, now", "Standard errors")
+    whole = Table(caption, header, rows, "baseline-changes", "lrrr")
     yield from paper_or_screen(whole, "Changes since the baseline")
 
 

@@ -15,25 +15,20 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Section,
     Table,
     Verdict,
     literal,
 )
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MEASURES, paper_or_screen
+from davinci_forces.report.sections.parts import MEASURES, paper_or_screen, run_cells, section_of
 
 MAX_RUNS_ON_PAPER = 9
 
 
-def section(context: Context) -> Section | None:
-    """The choice with its scores, and its error on unseen logs; None if no model was chosen."""
-    choices = context.catalogue.records(Choice)
-    return Section("Choice of the model", "choice", tuple(blocks(context, choices[0]))) if choices else None
-
-
-def blocks(context: Context, choice: Choice) -> Iterator[Block]:
-    """The section's content."""
+@section_of(Choice, "Choice of the model", "choice")
+def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
+    """The choice with its scores, and its error on unseen logs."""
+    choice = choices[0]
     yield Prose(
         "A candidate model has a structure: `independent` (each joint by itself) or `coupled` (through the arm's "
         "links). A name after + is added friction: `smooth` (continuous at zero velocity), `stribeck` (larger near "
@@ -59,10 +54,8 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     yield from search_tables(context)
     yield figure(choice)
     order = np.argsort(choice.score, kind="stable").tolist()
-    yield OnScreen(
-        "Every candidate", "all-candidates",
-        (table(context, choice, order, "Every candidate, the best first.", "candidates-table"),),
-    )  # fmt: skip
+    every = table(context, choice, order, "Every candidate, the best first.", "candidates-table")
+    yield OnScreen("Every candidate", "all-candidates", (every,))
     yield from unseen(context)
 
 
@@ -72,14 +65,12 @@ def search_tables(context: Context) -> Iterator[Block]:
     for search in context.catalogue.select(ModelSearch):
         if not search.used:
             continue
+        columns = search.step, search.step_cutoff, search.step_lag, search.step_ridge, search.parameters, search.score
         rows = tuple(
-            (
-                literal(str(search.step[i])), f"{search.step_cutoff[i]:g}", f"{1e3 * search.step_lag[i]:g}",
-                f"{search.step_ridge[i]:g}", str(search.parameters[i]), f"{search.score[i]:.4f}",
-            )
-            for i in range(search.chosen_step + 1)
-        )  # fmt: skip
-        last = len(search) - 1
+            (literal(str(step)), f"{cutoff:g}", f"{1e3 * lag:g}", f"{ridge:g}", str(parameters), f"{score:.4f}")
+            for step, cutoff, lag, ridge, parameters, score in zip(*columns, strict=True)
+        )
+        rows, last = rows[: search.chosen_step + 1], len(search) - 1
         end = f" The last step, {last}, reaches {search.score[last]:.4f}, which is not clearly less."
         caption = f"{title(search.joint)}, {search.structure}: relative error after each step of the search."
         caption += end if search.chosen_step < last else " No further step reduced the error."
@@ -142,8 +133,7 @@ def unseen(context: Context) -> Iterator[Block]:
         return
     rows = tuple(
         (
-            literal(p.log),
-            title(p.joint),
+            *run_cells(p),
             "fitted" if p.path == SAME_PATH else "new",
             context.number(f"{p.prefix}.relative_error", 3),
             context.number(f"predict.{p.log}.{p.joint}.independent.lse.relative_error", 3),

@@ -21,6 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.parts import run_cells
 from davinci_forces.study import LogEntry
 
 PRINTED = 20  # contacts of the PDF at most
@@ -62,12 +63,8 @@ def blocks(context: Context) -> Iterator[Block]:
         )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
-        yield Table(
-            "Joints of logs on which no contact was measured.",
-            ("Log", "Joint", "Reason, and remedy"),
-            unused,
-            "not-analysed",
-        )
+        header = ("Log", "Joint", "Reason, and remedy")
+        yield Table("Joints of logs on which no contact was measured.", header, unused, "not-analysed")
 
 
 def largest(contacts: list[Contact]) -> tuple[int, ...]:
@@ -82,8 +79,7 @@ def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
         key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
         onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
         plain = peak if isinstance(peak, str) else replace(peak, std=None)  # as the interval has its error
-        numbers = (onset, release, plain, interval(peak), mean, impulse)
-        yield (literal(contact.log), title(contact.joint), *numbers, verdict(contact, i))
+        yield (*run_cells(contact), onset, release, plain, interval(peak), mean, impulse, verdict(contact, i))
 
 
 def interval(peak: Number | str) -> str:
@@ -133,14 +129,12 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     tracked = {(track.log, track.joint): track for track in context.catalogue.records(Track)}
     palpated = {tissue.log for tissue in context.catalogue.records(Stiffness)}
     for entry in context.study.logs:
-        analysed = entry.name in weighed | palpated
-        if entry.role not in ("contact", "weight", "tissue", "friction") or analysed:
+        if entry.role not in ("contact", "weight", "tissue", "friction") or entry.name in weighed | palpated:
             continue
-        joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
         reasons: dict[str, list[str]] = {}
-        for joint in joints:
-            track = tracked.get((entry.name, joint))
-            reasons.setdefault(reason(entry, track), []).append(title(joint))
+        for joint in entry.joints:
+            if (entry.name, joint) not in measured:
+                reasons.setdefault(reason(entry, tracked.get((entry.name, joint))), []).append(title(joint))
         yield from ((entry.name, ", ".join(names), why) for why, names in reasons.items())
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Control, Lyapunov
-from davinci_forces.report.content import Block, Cell, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict
+from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.robots.robot import ControlStudy
 
@@ -35,14 +35,19 @@ def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
             yield Verdict("good" if rise.value == 0 else "bad", verdict)
         yield response(context, study)
     if exact:
-        yield settling_table(context, exact)
+        caption = "Time after which each joint stays within 2 % of its step, overshoot over the step, and error at the "
+        columns = {"Settling time": "settling_time", "Overshoot": "overshoot", "Error at the end": "error_end"}
+        yield table(context, exact, f"{caption}end.", columns)
     if light:
         yield Prose(
             "If the compensator does not know all of the masses, PD settles with an offset. Integral action removes "
             "this offset slowly: its slow pole keeps the error **larger** than PD's offset for some twenty seconds."
             + (" The thesis calls the response faster, which this simulation does not confirm." if thesis else "")
         )
-        yield errors(context, light)
+        share, end = light[0].known_masses, f"{light[0].duration:g} s"
+        caption = f"Position error when gravity is compensated with {share:g} of the masses, after 10, 20 and {end}."
+        columns = {"After 10 s": "error_10", "After 20 s": "error_20", f"After {end}": "error_end"}
+        yield table(context, light, caption, columns)
 
 
 def viscous_friction(context: Context, study: ControlStudy) -> str:
@@ -77,38 +82,16 @@ def response(context: Context, study: ControlStudy) -> Figure:
     )
 
 
-def settling_table(context: Context, studies: list[ControlStudy]) -> Table:
-    """Settling time and overshoot of each joint."""
-    names = ("settling_time", "overshoot", "error_end")
-    return Table(
-        "Time after which each joint stays within 2 % of its step, overshoot over the step, and error at the end.",
-        ("Study", "Joint", "Settling time", "Overshoot", "Error at the end"),
-        tuple(row(context, study.name, run, names) for study in studies for run in runs_of(context, study)),
-        align="llrrr",
+def table(context: Context, studies: list[ControlStudy], caption: str, columns: dict[str, str]) -> Table:
+    """Some numbers of each joint of studies: the header of each column, and the end of its keys."""
+    rows = tuple(
+        (study.name, title(run.joint), *context.numbers(f"control.{run.controller}.{run.joint}", columns.values()))
+        for study in studies
+        for run in runs_of(context, study)
     )
-
-
-def errors(context: Context, studies: list[ControlStudy]) -> Table:
-    """The error of each controller over time, where the masses are not known exactly."""
-    share, duration = studies[0].known_masses, studies[0].duration
-    return Table(
-        f"Position error when gravity is compensated with {share:g} of the masses, after 10, 20 and {duration:g} s.",
-        ("Study", "Joint", "After 10 s", "After 20 s", f"After {duration:g} s"),
-        tuple(
-            row(context, study.name, run, ("error_10", "error_20", "error_end"))
-            for study in studies
-            for run in runs_of(context, study)
-        ),
-        align="llrrr",
-    )
+    return Table(caption, ("Study", "Joint", *columns), rows, align="llrrr")
 
 
 def runs_of(context: Context, study: ControlStudy) -> list[Control]:
     """The joints of a study."""
     return context.catalogue.select(Control, controller=study.name)
-
-
-def row(context: Context, name: str, run: Control, numbers: tuple[str, ...]) -> tuple[Cell, ...]:
-    """One joint of a study with some of its numbers."""
-    key = f"control.{run.controller}.{run.joint}"
-    return (name, title(run.joint), *context.numbers(key, numbers))

@@ -3,20 +3,16 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Excitation
-from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import section_of
 
 SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, corrected", "found": "designed here"}
 
 
-def section(context: Context) -> Section | None:
-    """Objectives and limits of every trajectory."""
-    excitations = context.catalogue.records(Excitation)
-    return Section("Excitation", "excitation", tuple(blocks(context, excitations))) if excitations else None
-
-
-def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
-    """The section's content.  Fig 6.5, Table 6.1"""
+@section_of(Excitation, "Excitation", "excitation")
+def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
+    """Objectives and limits of every trajectory.  Fig 6.5, Table 6.1"""
     yield Prose(
         "The smaller the objective $-log_10 det(F^T F)$ over 300 samples of a period, the better a trajectory "
         "separates the parameters. Position, velocity and acceleration must keep their limits at every instant, so the "
@@ -24,27 +20,25 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
         "limits: the harmonics are scaled until they reach a limit; the mean may lie anywhere in the remaining range."
         + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
     )
-    yield Table(
+    objectives, coefficients, names = [], [], ("a0", "a1", "b1", "a2", "b2")
+    for e in excitations:
+        key, cells = f"excitation.{e.joint}.{e.source}", (title(e.joint), source_label(e))
+        numbers = context.numbers(key, ("objective", "condition"), 5)
+        objectives.append((*cells, *numbers, context.number(f"{key}.excess_q", 2)))
+        coefficients.append((*cells, *context.numbers(key, names, 4)))
+    caption = (
         "Objective and condition number of published trajectories and of trajectories designed here, and the excess of "
-        "each over its position limits.",
-        ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits"),
-        tuple(
-            (
-                title(e.joint),
-                source_label(e),
-                *context.numbers(f"excitation.{e.joint}.{e.source}", ("objective", "condition"), 5),
-                context.number(f"excitation.{e.joint}.{e.source}.excess_q", 2),
-            )
-            for e in excitations
-        ),
-        "excitation-table",
-        "llrrr",
+        "each over its position limits."
     )
+    header = ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits")
+    yield Table(caption, header, tuple(objectives), "excitation-table", "llrrr")
     for e in excitations:
         if max(e.excess_q, e.excess_dq, e.excess_ddq) > 0:
             excess = context.results[f"excitation.{e.joint}.{e.source}.excess_q"].number(2)
             yield Verdict("warn", f"**{title(e.joint)}**, {source_label(e)}: exceeds its position limits by {excess}.")
-    yield coefficients(context, excitations)
+    symbols = (f"${name[0]}_{name[1]}$" for name in names)
+    caption, columns = "Coefficients of the Fourier series.", ("Joint", "Trajectory", *symbols)
+    yield Table(caption, columns, tuple(coefficients), align="llrrrrr")
     for joint in dict.fromkeys(e.joint for e in excitations):
         yield figure(context, [e for e in excitations if e.joint == joint])
 
@@ -52,17 +46,6 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
 def source_label(e: Excitation) -> str:
     """The source of a trajectory."""
     return SOURCES.get(e.source, literal(e.source))
-
-
-def coefficients(context: Context, excitations: list[Excitation]) -> Table:
-    """The Fourier coefficients of every trajectory."""
-    names = ("a0", "a1", "b1", "a2", "b2")
-    rows = tuple(
-        (title(e.joint), source_label(e), *context.numbers(f"excitation.{e.joint}.{e.source}", names, 4))
-        for e in excitations
-    )
-    header = ("Joint", "Trajectory", *(f"${name[0]}_{name[1]}$" for name in names))
-    return Table("Coefficients of the Fourier series.", header, rows, align="llrrrrr")
 
 
 def figure(context: Context, trajectories: list[Excitation]) -> Figure:

@@ -20,6 +20,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import run_cells
 
 SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
 DRAWN = {
@@ -51,7 +52,8 @@ def blocks(context: Context) -> Iterator[Block]:
         "is less noisy."
     )
     yield tuning(context, noises)
-    worst = [track for noise in noises for track in worst_track(context, noise.joint)]
+    spaces = [space for noise in noises if (space := context.worst_space(noise.joint)) is not None]
+    worst = [t for space in spaces for t in context.catalogue.select(Track, log=space.log, joint=space.joint)]
     if worst:
         yield Prose(
             "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
@@ -71,12 +73,6 @@ def blocks(context: Context) -> Iterator[Block]:
         yield OnScreen("The same filter as samples arrive", "filters-streamed", (stream_table(context, logs),))
 
 
-def worst_track(context: Context, joint: str) -> Iterator[Track]:
-    """The run in free space that sets the detection level of a joint."""
-    if (space := context.worst_space(joint)) is not None:
-        yield from context.catalogue.select(Track, log=space.log, joint=joint)
-
-
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     """The tuned noise of each joint, and the logs of the tuning."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(
@@ -91,9 +87,8 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
         "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
         "per square root of a second."
     )
-    return Table(
-        caption, ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on"), rows, "filter-tuning", "lrrrrl"
-    )
+    header = ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on")
+    return Table(caption, header, rows, "filter-tuning", "lrrrrl")
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
@@ -102,47 +97,34 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     over_logs = ("coverage", "band_width")
     rows = tuple((*run_row(context, t, keys), *context.numbers(f"band.{t.joint}", over_logs, 2)) for t in tracks)
     header = ("Joint", "Worst free run", "Smoother", "Model", "RMS", "Coverage", "Mean coverage", "Half-width")
-    return Table(
+    caption = (
         "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
         "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
         "Mean coverage: of all logs that were not fitted, with its standard error over logs (with "
-        "fewer than 3 logs, over blocks of time). Half-width: the mean half-width of the bands of these logs.",
-        header,
-        rows,
-        "error-budget",
-        "llrrrrrr",
+        "fewer than 3 logs, over blocks of time). Half-width: the mean half-width of the bands of these logs."
     )
+    return Table(caption, header, rows, "error-budget", "llrrrrrr")
 
 
 def run_row(context: Context, t: Track, keys: Sequence[tuple[str, str]]) -> tuple[Cell, ...]:
     """The joint and log of a run, and its results `<prefix>.<log>.<joint>.<name>` by prefix and name."""
     numbers = (context.number(f"{prefix}.{t.log}.{t.joint}.{name}", 2) for prefix, name in keys)
-    return (title(t.joint), literal(t.log), *numbers)
+    return (*run_cells(t)[::-1], *numbers)
 
 
 def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
     """Smoother and filter on the worst free run of each joint, and the delay and lag of the filter."""
     keys = [(prefix, name) for name in ("free_rms", "detection_level") for prefix in ("effort", "ekf")]
     rows = tuple(run_row(context, t, (*keys, ("ekf", "push_delay"), ("ekf", "lag_part"))) for t in tracks)
-    return Table(
+    caption = (
         "The cost of real time. The report's results are those of the smoother, which uses samples before and after "
         "each instant. In real time only the filter is available. RMS and level: RMS and detection level in free "
         "space. Delay: of the filter's peak after that of a push of 1 s. Lag error: the standard deviation that the "
-        "filter's lag causes.",
-        (
-            "Joint",
-            "Worst free run",
-            "RMS, smoother",
-            "RMS, filter",
-            "Level, smoother",
-            "Level, filter",
-            "Delay",
-            "Lag error",
-        ),
-        rows,
-        "real-time-cost",
-        "llrrrrrr",
+        "filter's lag causes."
     )
+    compared = (f"{what}, {which}" for what in ("RMS", "Level") for which in ("smoother", "filter"))
+    header = ("Joint", "Worst free run", *compared, "Delay", "Lag error")
+    return Table(caption, header, rows, "real-time-cost", "llrrrrrr")
 
 
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
@@ -157,41 +139,35 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         )
         for s in logs
     )
-    return Table(
+    caption = (
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
         "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
         "delays, over the smoother's. Alarm level: crossed in free motion at most once in ten minutes, of all logs of "
-        "the joint; and the number of measured contacts that exceed it.",
-        ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found"),
-        rows,
-        "stream",
-        "llrrrrrr",
+        "the joint; and the number of measured contacts that exceed it."
     )
+    header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
+    return Table(caption, header, rows, "stream", "llrrrrrr")
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst run in free space of each joint."""
-    rows = tuple(compared_row(context, c) for c in compared)
+    names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
+    rows = tuple(
+        (
+            title(c.joint),
+            name_of(c.filter),
+            *(context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names),
+        )
+        for c in compared
+    )
     caption = (
         "Filters compared on each joint's worst run in free space. Each has the smallest random walk with which it "
         "follows a push. RMS and detection level: of the external effort in free motion. Peak ratio and delay: the "
         "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
     )
-    return Table(
-        caption,
-        ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay"),
-        rows,
-        "filter-comparison",
-        "llrrrr",
-    )
-
-
-def compared_row(context: Context, c: Comparison) -> tuple[Cell, ...]:
-    """One filter on one joint."""
-    names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
-    numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
-    return (title(c.joint), name_of(c.filter), *numbers)
+    header = ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay")
+    return Table(caption, header, rows, "filter-comparison", "llrrrr")
 
 
 def name_of(label: str) -> str:

@@ -59,8 +59,14 @@ def blocks(context: Context) -> Iterator[Block]:
     )
     yield from effects(context)
     errors: list[float] = []
-    for joint, path, theta in true_parameters(context):
-        yield from parameters(context, joint, path, theta, errors)
+    fitted = {fit.group for fit in context.own_fits()}
+    for name, entry in context.study.truth.get("theta", {}).items():
+        if name in fitted:
+            yield from parameters(context, name, ("theta", name), entry, errors)
+            continue
+        for joint, values in entry.items():  # a model of several joints has a table for each
+            if joint in fitted:
+                yield from parameters(context, joint, ("theta", name, joint), values, errors)
     if errors:
         yield truth_verdict("Parameters", errors)
     figures: list[Figure] = []
@@ -112,17 +118,6 @@ def used_parameters(context: Context, joint: str) -> Iterator[tuple[str, str]]:
                 yield parameter.removesuffix(f" of {joint}"), f"fit.{fit.group}.{name}.{slug(parameter)}"
 
 
-def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
-    """Joint, path in truth.toml and true parameters of every joint that has a fit."""
-    fitted = {fit.group for fit in context.own_fits()}
-    theta: dict[str, Any] = context.study.truth.get("theta", {})
-    for name, entry in theta.items():
-        if name in fitted:
-            yield name, ("theta", name), entry
-        else:  # a model of several joints has a table for each
-            yield from ((joint, ("theta", name, joint), values) for joint, values in entry.items() if joint in fitted)
-
-
 def parameters(
     context: Context, joint: str, path: tuple[str, ...], theta: dict[str, float], errors: list[float]
 ) -> Iterator[Table]:
@@ -167,30 +162,22 @@ def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
 
 def tip_forces(context: Context) -> Iterator[Block]:
     """The force at the tip, estimated and true; nothing where no push of a simulation is at the tip."""
-    pushed = {log["name"]: pushes for log in context.study.truth.get("log", []) if (pushes := at_the_tip(log))}
-    contacts = [
-        (contact, pushed[contact.log]) for contact in context.catalogue.records(TipContact) if contact.log in pushed
-    ]
+    logs = context.study.truth.get("log", [])
+    pushed = {log["name"]: [push for push in log.get("push", []) if "direction" in push] for log in logs}
+    pushed = {log: pushes for log, pushes in pushed.items() if pushes}
     pairs = [
         (contact, i, push)
-        for contact, pushes in contacts for i in range(len(contact)) for push in pushes if meet(contact, i, push)
-    ]  # fmt: skip
+        for contact in context.catalogue.records(TipContact)
+        for i in range(len(contact))
+        for push in pushed.get(contact.log, [])
+        if contact.onset[i] < push["end"] and contact.release[i] > push["start"]  # at the same time
+    ]
     if pairs:
         yield comparison(context, pairs)
         yield truth_verdict("Force at the tip", [size for pair in pairs for size in errors_in_deviations(*pair)])
     forces = [force for force in context.catalogue.records(TipForce) if force.log in pushed]
     figures = [force_figure(force, pushed[force.log]) for force in forces]
     yield from first_on_paper(figures, "Force at the tip, estimated and true, in other logs", "more-tip-truth")
-
-
-def at_the_tip(log: dict[str, Any]) -> list[Push]:
-    """The pushes at the tip in one log, which have a direction."""
-    return [push for push in log.get("push", []) if "direction" in push]
-
-
-def meet(contact: TipContact, i: int, push: Push) -> bool:
-    """Whether a contact and a push are at the same time."""
-    return bool(contact.onset[i] < push["end"] and contact.release[i] > push["start"])
 
 
 def force_of(push: Push) -> list[float]:
@@ -210,17 +197,14 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
     for contact, i, push in pairs:
         true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
         numbers = context.numbers(f"tip.{contact.log}.{i + 1}", COMPONENTS)
-        rows.append(
-            (literal(contact.log), str(i + 1), *true, *numbers, f"{max(errors_in_deviations(contact, i, push)):.1f}")
-        )
-    return Table(
+        worst = f"{max(errors_in_deviations(contact, i, push)):.1f}"
+        rows.append((literal(contact.log), str(i + 1), *true, *numbers, worst))
+    caption = (
         "The largest force at the tip in each contact [N], true and estimated, and the error of the worst component in "
-        "standard deviations. The true force is the peak of the push; the estimate can peak at another instant.",
-        ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error"),
-        tuple(rows),
-        "tip-truth",
-        "llrrrrrrr",
+        "standard deviations. The true force is the peak of the push; the estimate can peak at another instant."
     )
+    header = ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error")
+    return Table(caption, header, tuple(rows), "tip-truth", "llrrrrrrr")
 
 
 def truth_verdict(name: str, errors: list[float]) -> Verdict:

@@ -14,35 +14,23 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     VLine,
     VSpan,
 )
 from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, MS, hand_name
+from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
 
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
 
-def section(context: Context) -> Section | None:
-    """The haptic loop; None if no loop was simulated."""
-    runs = context.catalogue.records(HapticRun)
-    return Section("Haptic loop, simulated", "haptics", tuple(blocks(context, runs))) if runs else None
-
-
-def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
-    """The section's content.  Section 8.4"""
+@section_of(HapticRun, "Haptic loop, simulated", "haptics")
+def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
+    """The haptic loop.  Section 8.4"""
     responses = context.catalogue.records(HapticResponse)
-    yield OnScreen(
-        "The haptic loop, simulated: the force that each hand feels, and its error",
-        "haptic-loop",
-        (
-            Prose(experiment(context, responses)),
-            *(traces(context, run) for run in runs),
-            *(response_figure(response) for response in responses),
-        ),
-    )
+    figures = (*(traces(context, run) for run in runs), *map(response_figure, responses))
+    heading = "The haptic loop, simulated: the force that each hand feels, and its error"
+    yield OnScreen(heading, "haptic-loop", (Prose(experiment(context, responses)), *figures))
 
 
 def experiment(context: Context, responses: list[HapticResponse]) -> str:
@@ -77,36 +65,25 @@ def traces(context: Context, run: HapticRun) -> Figure:
     t = run.t[few]
     shaded = tuple(spans(run))
     ends = " The run ends where the hand leaves the device's reach." if run.out_of_reach else ""
+    positions = (
+        *shaded,
+        HLine(0.0),
+        Line(t, MM * run.plan_x[few], "plan", "grey", "dotted"),
+        Line(t, MM * run.hand_x[few], "hand", "blue", "solid"),
+        Line(t, MM * run.arm_x[few], "arm", "orange", "dashed"),
+    )
+    forces = (
+        *shaded,
+        Line(t, run.true_force[few], "true", "black", "solid"),
+        Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
+    )
     return Figure(
         f"Simulated, hand “{hand_name(context, run.hand)}” in and out of the tissue, contact shaded. Positions from "
         "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the "
         f"felt force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",
-        (
-            Panel(
-                "Position",
-                "time [s]",
-                "position [mm]",
-                (
-                    *shaded,
-                    HLine(0.0),
-                    Line(t, MM * run.plan_x[few], "plan", "grey", "dotted"),
-                    Line(t, MM * run.hand_x[few], "hand", "blue", "solid"),
-                    Line(t, MM * run.arm_x[few], "arm", "orange", "dashed"),
-                ),
-            ),
-            Panel(
-                "Force",
-                "time [s]",
-                "force [N]",
-                (
-                    *shaded,
-                    Line(t, run.true_force[few], "true", "black", "solid"),
-                    Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
-                ),
-            ),
-        ),
+        (Panel("Position", "time [s]", "position [mm]", positions), Panel("Force", "time [s]", "force [N]", forces)),
         f"haptic-{run.hand}",
         height=42,
     )

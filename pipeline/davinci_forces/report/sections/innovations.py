@@ -16,12 +16,11 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     Table,
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_name
+from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
 
 UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the correlation
 FINDINGS = {  # from the best to the least known
@@ -34,14 +33,9 @@ PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
-def section(context: Context) -> Section | None:
+@section_of(Explanation, "Innovations", "innovations")
+def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The verdict on every run, figures of the worst run of each joint, and every test on demand."""
-    explained = context.catalogue.records(Explanation)
-    return Section("Innovations", "innovations", tuple(blocks(context, explained))) if explained else None
-
-
-def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
-    """The section's content."""
     yield Prose(
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
@@ -56,7 +50,8 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
     )
     yield verdicts(context, explained)
-    drawn = [e for e in explained if is_worst(context, e)]
+    worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
+    drawn = [e for e in explained if (e.joint, e.log) in worst]
     drawn.sort(key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
     yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
@@ -83,21 +78,10 @@ def summary(explained: list[Explanation]) -> str:
     return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(findings)}."
 
 
-def is_worst(context: Context, e: Explanation) -> bool:
-    """Whether this is the worst run of its joint, which is drawn."""
-    space = context.worst_space(e.joint)
-    return space is not None and space.log == e.log
-
-
 def verdicts(context: Context, explained: list[Explanation]) -> Table:
     """The verdict on every run, in words."""
     rows = tuple(
-        (
-            literal(e.log),
-            title(e.joint),
-            *context.numbers(f"ekf.{e.log}.{e.joint}", ("nis_q", "nis_dq")),
-            literal(e.verdict),
-        )
+        (*run_cells(e), *context.numbers(f"ekf.{e.log}.{e.joint}", ("nis_q", "nis_dq")), literal(e.verdict))
         for e in explained
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
@@ -116,7 +100,7 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
 
 def tests(context: Context, explained: list[Explanation]) -> Table:
     """Every test of every run."""
-    rows = tuple((literal(e.log), title(e.joint), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
+    rows = tuple((*run_cells(e), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
     header = ("Log", "Joint", "NIS", "ACF(1), $q$", "ACF(1), $dot(q)$", "Ljung-Box, $q$", "Ljung-Box, $dot(q)$")
     return Table(
         "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
@@ -148,7 +132,7 @@ def trials(e: Explanation) -> Table:
             literal(str(e.without[i])),
             str(e.left[i]),
             f"{e.walk[i]:.3g}",
-            probability_text(least[i]),
+            f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001",
             "●" if e.explains[i] else "",
         )
         for i in order
@@ -166,11 +150,6 @@ def trials(e: Explanation) -> Table:
 def least_probability(e: Explanation) -> Column:
     """The smallest probability of all tests, of the run as it is and then without each cause."""
     return np.asarray(np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0))
-
-
-def probability_text(probability: float) -> str:
-    """A probability as it is printed."""
-    return f"{probability:.2g}" if probability >= 0.001 else "< 0.001"
 
 
 def figure(context: Context, e: Explanation, whole: bool) -> Figure:

@@ -1,7 +1,6 @@
 """The methods behind the numbers, with their equations."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from textwrap import fill
 
@@ -176,7 +175,11 @@ def section(context: Context) -> Section:
     text = (Listing(paragraph_for_paper(context)),) if context.own_fits() else ()
     paragraph = (Section("A paragraph for a paper", "paragraph", text),) if text else ()
     references = Section("References", "references", (Bullets(tuple(map(reference, ENTRY.findall(bibliography())))),))
-    return Section("Methods", "methods", (*blocks(context), limits, symbols, *paragraph, references))
+    settings = context.study.settings
+    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
+    made = (block for kind, method in METHODS if context.catalogue.records(kind) for block in method)
+    methods = (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in made)
+    return Section("Methods", "methods", (*methods, limits, symbols, *paragraph, references))
 
 
 def bibliography() -> str:
@@ -246,12 +249,3 @@ def in_current(context: Context) -> str:
         f" No torque constant of the {', '.join(joints)} is known. Their effort is the motor's current in A, and so "
         "are their external effort and levels."
     )
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The method of each stage that made records, in the order of the stages."""
-    settings = context.study.settings
-    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
-    for kind, method in METHODS:
-        if context.catalogue.records(kind):
-            yield from (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in method)

@@ -16,27 +16,20 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Section,
     Table,
     Verdict,
-    literal,
 )
-from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_name
+from davinci_forces.report.context import Context, count, label
+from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_cells, run_name, section_of
 from davinci_forces.report.verdicts import MAX_PERIOD_NOISE
 
 NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
 MAX_BARS = 24  # periods in the bar plot
 
 
-def section(context: Context) -> Section | None:
+@section_of(Average, "Averaging and noise", "noise")
+def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     """A table of standard deviations, the tests of the noise, and the noise that averaging removed from each log."""
-    averages = context.catalogue.records(Average)
-    return Section("Averaging and noise", "noise", tuple(blocks(context, averages))) if averages else None
-
-
-def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
-    """The section's content."""
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged. Differences between periods are taken "
         "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
@@ -44,8 +37,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     )
     rows = tuple(
         (
-            literal(a.log),
-            title(a.joint),
+            *run_cells(a),
             context.number(f"period.{a.log}", 6),
             context.count(f"period.{a.log}.periods"),
             *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau")),
@@ -70,19 +62,16 @@ def tests(context: Context, averages: list[Average]) -> Table:
     """Whether the noise is white and normal, signal by signal."""
     header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Excess kurtosis")
     rows = tuple(
-        (literal(a.log), title(a.joint), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
+        (*run_cells(a), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
         for a in averages
         for signal, meaning in NOISE_FIELDS.items()
     )
-    return Table(
+    caption = (
         "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the p-values of the "
         "Ljung-Box test (white) and of the Jarque-Bera test (normal). A p-value below 0.01 means no. Real encoders, "
-        "their derivative and a jittering clock give coloured noise (not white); the filter assumes white noise.",
-        header,
-        rows,
-        "noise-tests",
-        "lllrrrrr",
+        "their derivative and a jittering clock give coloured noise (not white); the filter assumes white noise."
     )
+    return Table(caption, header, rows, "noise-tests", "lllrrrrr")
 
 
 def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
@@ -170,18 +159,15 @@ def spectrum(s: Spectrum) -> Panel:
 def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]:
     """Velocity and acceleration from the harmonics and by differences.  Fig 6.9"""
     step = average.t[1] - average.t[0]
-    velocity = (
-        Line(average.t, np.gradient(average.q, step), "difference of position", "sky"),
-        Line(trajectory.t, trajectory.dq, "harmonics", "vermillion"),
-    )
-    acceleration = (
-        Line(average.t, np.gradient(average.dq, step), "difference of velocity", "sky"),
-        Line(trajectory.t, trajectory.ddq, "harmonics", "vermillion"),
-    )
-    return (
-        Panel("Velocity", "time [s]", label(trajectory, "dq", "velocity"), velocity),
-        Panel("Acceleration", "time [s]", label(trajectory, "ddq", "acceleration"), acceleration),
-    )
+
+    def panel(meaning: str, of: str, x: Column, field: str) -> Panel:
+        marks = (
+            Line(average.t, np.gradient(x, step), f"difference of {of}", "sky"),
+            Line(trajectory.t, getattr(trajectory, field), "harmonics", "vermillion"),
+        )
+        return Panel(meaning.capitalize(), "time [s]", label(trajectory, field, meaning), marks)
+
+    return panel("velocity", "position", average.q, "dq"), panel("acceleration", "velocity", average.dq, "ddq")
 
 
 def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:

@@ -1,12 +1,14 @@
 """Parts that several sections share: tables on paper or on screen, marks of a run, and words."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
 
 from davinci_forces.maths.arrays import evenly
-from davinci_forces.records import Column, PathShare, Prediction, Residual, Track, Whiteness
+from davinci_forces.records import Column, PathShare, Prediction, Record, Residual, Track, Whiteness
 from davinci_forces.report.content import (
     AnyMark,
     Block,
@@ -16,6 +18,7 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Reference,
+    Section,
     Stems,
     Table,
     VSpan,
@@ -41,6 +44,30 @@ MEASURES = (
     "follow this path, so extra parameters lower this error even if they overfit. With blocks of path left out, on raw "
     "samples, the error measures what to expect on a new path. This error is larger, and the model is chosen by it."
 )
+
+
+R = TypeVar("R", bound=Record)
+
+
+def section_of(
+    kind: type[R], heading: str, anchor: str
+) -> Callable[[Callable[[Context, list[R]], Iterator[Block]]], Callable[[Context], Section | None]]:
+    """Turn a function that yields blocks about records of a kind into a section; None if there are no such records."""
+
+    def decorate(blocks: Callable[[Context, list[R]], Iterator[Block]]) -> Callable[[Context], Section | None]:
+        @wraps(blocks)
+        def section(context: Context) -> Section | None:
+            records = context.catalogue.records(kind)
+            return Section(heading, anchor, tuple(blocks(context, records))) if records else None
+
+        return section
+
+    return decorate
+
+
+def run_cells(run: Any) -> tuple[str, str]:
+    """The first cells of a row about a record of a joint in a log."""
+    return literal(run.log), title(run.joint)
 
 
 def hand_name(context: Context, hand: str) -> str:

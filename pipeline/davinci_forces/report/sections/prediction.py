@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Table
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections.parts import (
     LEFT_OUT,
@@ -11,19 +11,16 @@ from davinci_forces.report.sections.parts import (
     effort_panel,
     first_on_paper,
     paper_or_screen,
+    run_cells,
     run_name,
+    section_of,
 )
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
 
-def section(context: Context) -> Section | None:
+@section_of(Prediction, "Prediction", "prediction")
+def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
-    predictions = context.catalogue.records(Prediction)
-    return Section("Prediction", "prediction", tuple(blocks(context, predictions))) if predictions else None
-
-
-def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
-    """The section's content."""
     yield Prose(
         "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
         "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
@@ -43,20 +40,14 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "(constant part) of the difference, as from another payload; and the model error over the root mean square of "
         "the effort."
     )
-    yield from paper_or_screen(
-        Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrrr")
-    )
+    rows = tuple(row(context, p) for p in used)
+    yield from paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
     scores = (*estimators(context, predictions), every_score(context, predictions))
     yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
-    joints = dict.fromkeys(p.joint for p in used)
     unseen = [p for p in used if p.role != "identification"] or used
-    worst = [
-        max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error)
-        for joint in joints
-        if any(p.joint == joint for p in unseen)
-    ]
-    # The worst of all on paper.
-    worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))
+    joints = dict.fromkeys(p.joint for p in unseen)
+    worst = [max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error) for joint in joints]
+    worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))  # the worst of all on paper
     figures = [figure(context, p) for p in worst]
     yield from first_on_paper(figures, "The worst predicted run of each other joint", "worst-predicted")
 
@@ -68,15 +59,14 @@ def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
     error, mean, r2, ceiling = context.numbers(p.prefix, ("model_error", "mean_error", "r2", "r2_ceiling"), 2)
-    return literal(p.log), title(p.joint), how, new, error, mean, share, r2, ceiling
+    return *run_cells(p), how, new, error, mean, share, r2, ceiling
 
 
 def every_score(context: Context, predictions: list[Prediction]) -> Table:
     """All scores of all fits."""
     names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "relative_error")
     rows = tuple(
-        (literal(p.log), title(p.joint), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names))
-        for p in predictions
+        (*run_cells(p), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names)) for p in predictions
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
     caption = "Scores of the raw effort, and the relative error of the low-passed effort."
@@ -102,8 +92,8 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 
 def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
     """The model error of one fit in the worst run of a joint that was not fitted."""
-    unseen = [p for p in predictions if p.joint == joint and p.role != "identification"]
-    unseen = unseen or [p for p in predictions if p.joint == joint]
+    of_joint = [p for p in predictions if p.joint == joint]
+    unseen = [p for p in of_joint if p.role != "identification"] or of_joint
     unseen = [p for p in unseen if (p.model, p.estimator) == (model, estimator)]
     if not unseen:
         return "–"

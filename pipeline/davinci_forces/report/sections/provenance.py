@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 from davinci_forces.records import KINDS, LogSummary
-from davinci_forces.records.catalogue import Provenance
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import paper_or_screen
@@ -42,24 +41,19 @@ def blocks(context: Context) -> Iterator[Block]:
     if study.changed:
         yield Prose("Changes of the robot:")
         yield Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))
-    if number := len(provenance.processed):
-        name = f"The {number} processed files by kind of record; kinds without input data"
-        yield OnScreen(name, "made", (record_counts(provenance),))
+    if provenance.processed:
+        name = f"The {len(provenance.processed)} processed files by kind of record; kinds without input data"
+        folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
+        counts = tuple(
+            (kind, str(folders[record.folder()] or "skipped: no input for it")) for kind, record in KINDS.items()
+        )
+        caption = "Kinds of record, and the number of processed files of each kind."
+        yield OnScreen(name, "made", (Table(caption, ("Record", "Files"), counts),))
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
     if provenance.study:
         yield OnScreen("The study file", "study-file", (Listing(provenance.study),))
-
-
-def record_counts(provenance: Provenance) -> Table:
-    """The number of files of each kind of record."""
-    folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
-    rows = tuple(
-        (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: no input for it")
-        for name, kind in KINDS.items()
-    )
-    return Table("Kinds of record, and the number of processed files of each kind.", ("Record", "Files"), rows)
 
 
 def channels(summaries: list[LogSummary]) -> Table:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from hashlib import sha256
 
-from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.content import Block, Prose, Section, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import RATINGS, paper_or_screen
 from davinci_forces.study.review import STUDY, Rating
@@ -30,28 +30,17 @@ def blocks(context: Context) -> Iterator[Block]:
         )
     else:
         yield Verdict("info", "All ratings are of the numbers that this report shows.")
-    rows = tuple(row(context, rating, rating.results == now) for rating in context.ratings)
-    yield from paper_or_screen(
-        Table(
-            "Ratings, in the order of review.toml.",
-            ("Of", "Rating", "Comment", "Reviewer", "Date", "Numbers"),
-            rows,
-            "ratings",
-            "llllll",
+    rows = tuple(
+        (
+            subject(context, rating),
+            RATINGS[rating.verdict],
+            *(literal(text) or "–" for text in (rating.comment, rating.reviewer, rating.date)),
+            "as rated" if rating.results == now else "changed since",
         )
+        for rating in context.ratings
     )
-
-
-def row(context: Context, rating: Rating, same: bool) -> tuple[Cell, ...]:
-    """One rating."""
-    return (
-        subject(context, rating),
-        RATINGS[rating.verdict],
-        literal(rating.comment) or "–",
-        literal(rating.reviewer) or "–",
-        literal(rating.date) or "–",
-        "as rated" if same else "changed since",
-    )
+    header = ("Of", "Rating", "Comment", "Reviewer", "Date", "Numbers")
+    yield from paper_or_screen(Table("Ratings, in the order of review.toml.", header, rows, "ratings", "llllll"))
 
 
 def subject(context: Context, rating: Rating) -> str:

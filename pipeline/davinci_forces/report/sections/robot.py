@@ -3,19 +3,15 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Links, Pose, Workspace
-from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Section, Table, literal
+from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
 from davinci_forces.report.context import Context
+from davinci_forces.report.sections.parts import section_of
 
 
-def section(context: Context) -> Section | None:
-    """The chain and its table; None if the robot's geometry is not known."""
-    links = context.catalogue.records(Links)
-    return Section("The robot", "robot", tuple(blocks(context, links[0]))) if links else None
-
-
-def blocks(context: Context, links: Links) -> Iterator[Block]:
-    """The section's content.  Tables 3.1, 4.2, Fig 3.5"""
-    worst = context.results["robot.worst_condition"].number(3)
+@section_of(Links, "The robot", "robot")
+def section(context: Context, records: list[Links]) -> Iterator[Block]:
+    """The chain and its table.  Tables 3.1, 4.2, Fig 3.5"""
+    links, worst = records[0], context.results["robot.worst_condition"].number(3)
     yield Prose(
         f"The {literal(context.study.robot.title)} is modelled as a Denavit-Hartenberg chain. The parallelogram's "
         "links share the coordinate of the pitch, so the tool pivots about a remote centre without a bearing there. "

@@ -19,8 +19,15 @@ from davinci_forces.report.content import (
     Verdict,
     literal,
 )
-from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, paper_or_screen, run_name
+from davinci_forces.report.context import Context, count, label
+from davinci_forces.report.sections.parts import (
+    contact_spans,
+    effort_panel,
+    first_on_paper,
+    paper_or_screen,
+    run_cells,
+    run_name,
+)
 from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
 WORST = "the worst run of this joint in free space"
@@ -43,7 +50,9 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
         return
     yield from intro(context, tracks)
     yield from paper_or_screen(scores(context, tracks))
-    worst = list(worst_runs(context, tracks))
+    joints = dict.fromkeys(track.joint for track in tracks)
+    spaces = [space for joint in joints if (space := context.worst_space(joint)) is not None]
+    worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
     drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
     yield from first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
@@ -73,23 +82,10 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
         )
 
 
-def worst_runs(context: Context, tracks: list[Track]) -> Iterator[Track]:
-    """For each joint, the run with the highest detection level in free space that was not fitted."""
-    for joint in dict.fromkeys(track.joint for track in tracks):
-        if (space := context.worst_space(joint)) is not None:
-            yield from (track for track in tracks if (track.log, track.joint) == (space.log, joint))
-
-
 def scores(context: Context, tracks: list[Track]) -> Table:
     """The external effort of every track in free space, and the coverage of its band."""
     rows = tuple(
-        (
-            literal(t.log),
-            title(t.joint),
-            *context.numbers(f"effort.{t.log}.{t.joint}", LEVELS, 2),
-            *coverage(context, t),
-        )
-        for t in tracks
+        (*run_cells(t), *context.numbers(f"effort.{t.log}.{t.joint}", LEVELS, 2), *coverage(context, t)) for t in tracks
     )
     header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "By speed", "Band")
     caption = (
@@ -111,17 +107,15 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 def assumptions(context: Context, tracks: list[Track]) -> Table:
     """The noise that the filter assumes in each run."""
     names = ("r_q", "r_dq", "q_dq", "q_tau")
-    rows = tuple((literal(t.log), title(t.joint), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
-    return Table(
+    rows = tuple((*run_cells(t), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
+    caption = (
         "Noise that the filter assumes (standard deviations): of the measured position and velocity, of the velocity "
         "per sample due to effort noise, and of the random walk of the external effort. The first three maximise the "
         "likelihood of the innovations of identification logs. The random walk is the smallest with which the filter "
-        "follows a push.",
-        ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
-        rows,
-        "filter-noise",
-        "llrrrr",
+        "follows a push."
     )
+    header = ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk")
+    return Table(caption, header, rows, "filter-noise", "llrrrr")
 
 
 def trace(context: Context, t: Track, why: str) -> Figure:
@@ -159,11 +153,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     if not summaries:
         return
     yield from paper_or_screen(overview(context, summaries))
-    diagnostics = [
-        diagnostic
-        for diagnostic in context.catalogue.records(Diagnostic)
-        if diagnostic.stage in ("ingest", "resample", "average")
-    ]
+    diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("ingest", "resample", "average")]
     remarks_of_stages = [literal(text) for diagnostic in diagnostics for text in diagnostic.text]
     remarked = {summary.log: texts for summary in summaries if (texts := log_remarks(summary))}
     followed = {diagnostic.subject.partition(".")[0] for diagnostic in diagnostics}  # logs with remarks of the stages
@@ -174,10 +164,11 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
     methods = sorted({(clock(s, context), s.velocity) for s in context.catalogue.records(Signal)})
     if methods:
+        cutoff = context.study.settings.lowpass
+        derived = f"differences of the position after a zero-phase low-pass at {cutoff:g} Hz"
+        sources = ((method, "as logged" if velocity == "logged" else derived) for method, velocity in methods)
         yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
-        yield Bullets(
-            tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
-        )
+        yield Bullets(tuple(f"clock: {method}; velocity: {source}" for method, source in sources))
     if remarks_of_stages:
         yield Prose(
             "Remarks of the file readers and of the stages `ingest`, `resample` and `average`; `davinci-forces guide "
@@ -191,13 +182,6 @@ def clock(signal: Signal, context: Context) -> str:
     return "the rate stated in study.toml" if context.study.log(signal.log).rate else signal.method
 
 
-def velocity_source(velocity: str, context: Context) -> str:
-    """The source of a velocity."""
-    cutoff = context.study.settings.lowpass
-    derived = f"differences of the position after a zero-phase low-pass at {cutoff:g} Hz"
-    return "as logged" if velocity == "logged" else derived
-
-
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
     rows = tuple(
@@ -206,8 +190,7 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
             summary.role,
             summary.format,
             context.count(f"log.{summary.log}.rows"),
-            context.number(f"log.{summary.log}.rate", 5),
-            context.number(f"log.{summary.log}.duration", 5),
+            *context.numbers(f"log.{summary.log}", ("rate", "duration"), 5),
             context.number(f"log.{summary.log}.jitter", 2),
             context.number(f"period.{summary.log}", 6, std=None),
             context.count(f"period.{summary.log}.periods"),

@@ -13,27 +13,20 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     Table,
     literal,
 )
-from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import paper_or_screen
+from davinci_forces.report.sections.parts import paper_or_screen, section_of
 from davinci_forces.report.verdicts import band_in_words
 
 PUBLISHED_ERROR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
 VECTOR = "vector"  # the axis that stands for all three
 
 
-def section(context: Context) -> Section | None:
+@section_of(SensorForce, "Against a force sensor", "sensor")
+def section(context: Context, forces: list[SensorForce]) -> Iterator[Block]:
     """A table of all logs with a sensor and of the best published error for this arm, and both forces over time."""
-    forces = context.catalogue.records(SensorForce)
-    return Section("Against a force sensor", "sensor", tuple(blocks(context, forces))) if forces else None
-
-
-def blocks(context: Context, forces: Sequence[SensorForce]) -> Iterator[Block]:
-    """The section's content."""
     yield Prose(
         "A sensor measured the force in these logs; nothing was fitted to it. The error is the estimated force minus "
         "the sensor's at the same instant. The filter's first second and poses near a singularity are left out. The "
@@ -44,43 +37,27 @@ def blocks(context: Context, forces: Sequence[SensorForce]) -> Iterator[Block]:
         "range averaged over axes; the row **vector** states the same here."
     )
     yield from paper_or_screen(table(context, forces))
-    first, *others = dict.fromkeys(force.log for force in forces)
-    yield figure([force for force in forces if force.log == first])
-    for log in others:
-        yield OnScreen(
-            f"Both forces in {literal(log)}",
-            f"sensor-{log}",
-            (figure([force for force in forces if force.log == log]),),
-        )
+    for i, log in enumerate(dict.fromkeys(force.log for force in forces)):
+        shown = figure([force for force in forces if force.log == log])
+        yield OnScreen(f"Both forces in {literal(log)}", f"sensor-{log}", (shown,)) if i else shown
 
 
 def table(context: Context, forces: Sequence[SensorForce]) -> Table:
     """The errors of every log and axis; the published error last."""
     names = ("rmse", "bias", "largest", "range", "relative_error", "lag", "coverage")
-    rows: list[tuple[Cell, ...]] = [
-        (
-            literal(force.log),
-            axis_name(force.axis),
-            *context.numbers(f"sensor.{force.log}.{force.axis}", names),
-            band_in_words(force.sensor_coverage),
-        )
-        for force in forces
-    ]
+    rows: list[tuple[Cell, ...]] = []
+    for force in forces:
+        axis = f"${force.axis}_0$" if force.axis in ("x", "y", "z") else title(force.axis).lower()
+        numbers = context.numbers(f"sensor.{force.log}.{force.axis}", names)
+        rows.append((literal(force.log), axis, *numbers, band_in_words(force.sensor_coverage)))
     rows.append(("Yang et al. 2024", "three axes", "–", "–", "–", "–", f"{PUBLISHED_ERROR}", "–", "–", "–"))
-    return Table(
+    caption = (
         "The estimated force minus the sensor's: root mean square (RMSE), mean (bias) and largest difference; the "
         "range of the sensor's force, and the RMSE as a share of it; the lag of the sensor; the share of samples "
-        "within the 95 % band.",
-        ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "RMSE / range", "Lag", "Coverage", "Band"),
-        tuple(rows),
-        "sensor-errors",
-        "llrrrrrrrl",
+        "within the 95 % band."
     )
-
-
-def axis_name(axis: str) -> str:
-    """The printed name of an axis."""
-    return f"${axis}_0$" if axis in ("x", "y", "z") else title(axis).lower()
+    header = ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "RMSE / range", "Lag", "Coverage", "Band")
+    return Table(caption, header, tuple(rows), "sensor-errors", "llrrrrrrrl")
 
 
 def figure(forces: Sequence[SensorForce]) -> Figure:
@@ -102,10 +79,11 @@ def panel(force: SensorForce, named: bool) -> Panel:
     """One axis."""
     half = force.estimated_force_std * NORMAL_95
     lower, upper = force.estimated_force - half, force.estimated_force + half
-    marks: tuple[AnyMark, ...] = (
-        Band(force.t, lower, upper, "95 % band" if named else "", "sky"),
-        Line(force.t, force.measured_force, "sensor" if named else "", "black"),
-        Line(force.t, force.estimated_force, "estimate" if named else "", "vermillion"),
+    band, sensor, estimate = ("95 % band", "sensor", "estimate") if named else ("", "", "")
+    marks = (
+        Band(force.t, lower, upper, band, "sky"),
+        Line(force.t, force.measured_force, sensor, "black"),
+        Line(force.t, force.estimated_force, estimate, "vermillion"),
     )
-    what = {"x": "Along x0", "y": "Along y0", "z": "Along z0"}.get(force.axis, title(force.axis))
+    what = f"Along {force.axis}0" if force.axis in ("x", "y", "z") else title(force.axis)
     return Panel(what, "time [s]", label(force, "measured_force", "force"), marks)

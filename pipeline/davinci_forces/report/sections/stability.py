@@ -15,13 +15,12 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     Table,
     Verdict,
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, label
-from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name
+from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name, section_of
 
 NORMAL_95 = 1.96  # quantile of a 95 % interval
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
@@ -47,19 +46,22 @@ ROWS = (
 LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst switching", "vermillion"), "at contact": ("contact", "blue")}
 
 
-def section(context: Context) -> Section | None:
-    """The stability limits of each simulated hand; None if no tissue was measured."""
-    limits = context.catalogue.records(HandLimit)
-    return Section("Stability of haptic feedback", "stability", tuple(blocks(context, limits))) if limits else None
-
-
-def blocks(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
-    """The section's content.  Section 8.3"""
+@section_of(HandLimit, "Stability of haptic feedback", "stability")
+def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
+    """The stability limits of each simulated hand.  Section 8.3"""
     tissues = [tissue for tissue in context.catalogue.records(Stiffness) if tissue.pushes and tissue.stiffness > 0.0]
     yield from (verdict(context, limit, tissues) for limit in limits if tissues)
     yield Prose(f"{model(context, limits)}\n\n{without_delay(context)}")
     yield limits_table(context, limits)
-    yield limits_figure(context, limits, tissues)
+    yield Figure(
+        "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
+        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
+        "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
+        (map_panel(context, tissues), delay_panel(context, limits, tissues)),
+        "stability-limits",
+        columns=2,
+        height=62,
+    )
     yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 
@@ -124,28 +126,13 @@ def limits_table(context: Context, limits: list[HandLimit]) -> Table:
     """The limits of all hands, with what each includes."""
     keys = [f"stability.{limit.hand}" for limit in limits]
     rows = tuple((name, *(context.number(f"{key}.{field}", 3) for key in keys), what) for field, name, what in ROWS)
-    return Table(
+    caption = (
         "Limits of the tissue's stiffness, and what they follow from. The standard error of the formula's limit "
         "includes those of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's "
-        "parameters. A dash marks a limit that was not found, or an error that is not known.",
-        ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes"),
-        rows,
-        "stability-table",
-        "l" + "r" * len(limits) + "l",
+        "parameters. A dash marks a limit that was not found, or an error that is not known."
     )
-
-
-def limits_figure(context: Context, limits: list[HandLimit], tissues: list[Stiffness]) -> Figure:
-    """The map without delay, and the limit over an additional delay."""
-    return Figure(
-        "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
-        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
-        "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
-        (map_panel(context, tissues), delay_panel(context, limits, tissues)),
-        "stability-limits",
-        columns=2,
-        height=62,
-    )
+    header = ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes")
+    return Table(caption, header, rows, "stability-table", "l" + "r" * len(limits) + "l")
 
 
 def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
@@ -157,14 +144,9 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
         marks.append(Band(limit.k_h, limit.k_t_cqlf, top, beyond, "vermillion"))
         marks.append(Line(limit.k_h, limit.k_t_cqlf, "Lyapunov function", "black", "solid"))
         marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
-    return Panel(
-        "Without delay",
-        "stiffness of the hand [N/m]",
-        "stiffness of tissue [N/m]",
-        (*marks, *tissue_lines(context, tissues)),
-        x_log=True,
-        y_log=True,
-    )
+    marks += tissue_lines(context, tissues)
+    across, up = "stiffness of the hand [N/m]", "stiffness of tissue [N/m]"
+    return Panel("Without delay", across, up, tuple(marks), x_log=True, y_log=True)
 
 
 def tissue_lines(context: Context, tissues: list[Stiffness]) -> Iterator[HLine]:
@@ -179,10 +161,8 @@ def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffne
     """The limit of each hand over an additional delay."""
     marks: list[AnyMark] = []
     for limit, colour in zip(limits, cycle(COLOURS), strict=False):
-        known = limit.k_t_delay > 0.0
-        marks.append(
-            Line(MS * limit.delay[known], limit.k_t_delay[known], hand_name(context, limit.hand), colour, "solid")
-        )
+        known, name = limit.k_t_delay > 0.0, hand_name(context, limit.hand)
+        marks.append(Line(MS * limit.delay[known], limit.k_t_delay[known], name, colour, "solid"))
     marks += tissue_lines(context, tissues)
     return Panel("Whole loop", "added delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from davinci_forces.report.content import Block, Prose, Section, Table, literal
 from davinci_forces.report.context import Context
-from davinci_forces.simulation.thesis import PrintedNumbers, chapters, in_words, numbers
+from davinci_forces.simulation.thesis import chapters, in_words, numbers
 
 STUDY = "davinci-thesis"  # of the thesis's identification
 
@@ -25,9 +25,8 @@ def blocks(context: Context) -> Iterator[Block]:
         rows = tuple((literal(row.item), literal(row.shows), row.here, literal(row.differs)) for row in chapter.rows)
         yield Table(f"Chapter {chapter.title}.", ("Item", "Shows", "Here", "Differs"), rows, align="llll")
     header = ("Item", "Numbers", "Printed", "Here", "Why")
-    yield Table("Numbers of the thesis, as printed and here.", header, tuple(map(number_row, compared)), align="lllll")
-
-
-def number_row(x: PrintedNumbers) -> tuple[str, ...]:
-    """Printed numbers beside ours; only those that differ are repeated."""
-    return (literal(x.item), literal(x.name), x.printed_text, x.here_text, literal(x.why if x.differ.any() else ""))
+    lines = tuple(
+        (literal(x.item), literal(x.name), x.printed_text, x.here_text, literal(x.why if x.differ.any() else ""))
+        for x in compared
+    )
+    yield Table("Numbers of the thesis, as printed and here.", header, lines, align="lllll")

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Diagnostic, TipBudget, TipContact, TipForce
 from davinci_forces.report.content import (
@@ -22,7 +23,6 @@ from davinci_forces.report.content import (
     Panel,
     Points3D,
     Prose,
-    Section,
     Table,
     Verdict,
     VSpan,
@@ -31,8 +31,10 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import section_of
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
+F = ("f_x", "f_y", "f_z")
 AXIS_LABELS = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
 PATH_POINTS = 600  # points drawn of the path in space
 CONVERGENCE = 1.0  # [s] time in which the filter converges; the axis of the force does not show its wide band
@@ -40,14 +42,9 @@ SPACING = 0.2  # [s] between the vectors that are drawn in a contact
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
 
-def section(context: Context) -> Section | None:
+@section_of(TipForce, "Force at the tip", "tip")
+def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The force at the tip of every log in which all joints that carry it move."""
-    forces = context.catalogue.records(TipForce)
-    return Section("Force at the tip", "tip", tuple(blocks(context, forces))) if forces else None
-
-
-def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
-    """The section's content."""
     yield Prose(
         "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
         "from the external efforts of the first three joints, at times when all of them move. Two assumptions are "
@@ -101,71 +98,51 @@ def correlations(forces: Sequence[TipForce]) -> str:
 def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
     rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
-    return Table(
+    caption = (
         "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
         "along the least certain direction, which is the last column. “Found” marks a window that the study does not "
-        "state, “near singular” a pose in which the force is uncertain.",
-        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction"),
-        rows,
-        "tip-contacts",
-        "llrrrrrl",
+        "state, “near singular” a pose in which the force is uncertain."
     )
+    header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
+    return Table(caption, header, rows, "tip-contacts", "llrrrrrl")
 
 
 def contact_rows(context: Context, contact: TipContact) -> Iterator[tuple[Cell, ...]]:
     """One row a window."""
     for i in range(len(contact)):
         prefix = f"tip.{contact.log}.{i + 1}"
-        numbers = [context.number(f"{prefix}.{name}", 3) for name in ("f_x", "f_y", "f_z", "peak")]
-        weak = ", ".join(signed_text(x[i], 1) for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+        numbers = context.numbers(prefix, (*F, "peak"))
+        weak = ", ".join(f"{round(x[i], 1) + 0.0:.1f}" for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+        weak = weak.replace("-", MINUS)
         window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s"
         remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
         yield (literal(contact.log), window + remark, *numbers, context.number(f"{prefix}.sigma_1", 2), f"({weak})")
 
 
-def signed_text(value: float, decimals: int) -> str:
-    """A number with a sign as it is printed, and none where it is zero."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
-
-
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     """The force that is estimated in free space, and the condition of the poses."""
-    rows = tuple(
-        (
-            literal(force.log),
-            force.role,
-            *context.numbers(
-                f"tip.{force.log}",
-                ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular"),
-            ),
-        )
-        for force in forces
-    )
-    return Table(
+    names = ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular")
+    rows = tuple((literal(force.log), force.role, *context.numbers(f"tip.{force.log}", names)) for force in forces)
+    caption = (
         "The size of the estimated force at the tip in free space, where the true force is zero: root mean square "
         "(RMS), and the levels that 95 % and 99 % (detection level) of samples stay below. Forces below the detection "
         "level cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains "
         "zero. Condition: the median condition number of the Jacobian, the ratio between the errors of the force in "
         "its least and its most certain direction if all joints err alike. Near singular: samples with a condition "
         f"number above {NEAR_SINGULAR:g}, at which the tip is within about a centimetre of the remote centre; these "
-        "samples are left out.",
-        ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
-        rows,
-        "tip-levels",
-        "llrrrrrr",
+        "samples are left out."
     )
+    header = ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular")
+    return Table(caption, header, rows, "tip-levels", "llrrrrrr")
 
 
 def narrow(forces: Sequence[TipForce]) -> Iterator[Verdict]:
     """Logs whose band is too narrow."""
     for force in forces:
         if band(force.force_coverage) == "bad":
-            yield Verdict(
-                "bad",
-                f"**{literal(force.log)}**: the 95 % band of the force is too narrow: it covers "
-                f"{percent(force.force_coverage)} of samples in free space. Trust the detection level rather than the "
-                "standard deviations.",
-            )
+            covers = f"it covers {percent(force.force_coverage)} of samples in free space"
+            text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
+            yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
 
 
 def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | None) -> Iterator[Block]:
@@ -213,9 +190,8 @@ def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] 
 def condition_panel(force: TipForce) -> Panel:
     """The condition number of the Jacobian over time."""
     near = bool(force.near_singular.any())
-    marks: tuple[AnyMark, ...] = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"),)
-    if near:
-        marks = (*marks, HLine(NEAR_SINGULAR, "near singular"))
+    bound = (HLine(NEAR_SINGULAR, "near singular"),) if near else ()
+    marks = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"), *bound)
     return Panel("Condition number of the Jacobian", "time [s]", "condition", marks, y_log=near)
 
 
@@ -224,19 +200,17 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     path = np.column_stack([force.x, force.y, force.z])
     extent = float(np.ptp(path, axis=0).max())
     per_newton = REACH * extent / float(contact.f_peak.max())
-    few = np.unique(np.linspace(0, len(path) - 1, PATH_POINTS).round().astype(int))
+    few = evenly(len(path), PATH_POINTS)
     at, f = contact_samples(force, contact)
     here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
     weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
-    ends = here + per_newton * largest
+    ends, (x, y, z) = here + per_newton * largest, here.T
     marks = (
         line(path[few], "path of the tip", "grey"),
         line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky", arrow=True),
         line(strokes(here, ends), "where it is largest", "vermillion", arrow=True),
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
-        Points3D(
-            here[:, 0], here[:, 1], here[:, 2], "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))
-        ),
+        Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
     )
     return Figure3D(
         f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered in the "
@@ -247,9 +221,6 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         f"tip-space-{force.log}",
         height=88,
     )
-
-
-F = ("f_x", "f_y", "f_z")
 
 
 def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Column]:

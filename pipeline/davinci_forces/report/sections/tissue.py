@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Booleans, evenly
+from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Push, Stiffness, TissueModel
 from davinci_forces.report.content import (
@@ -19,7 +19,6 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Section,
     Table,
     Verdict,
     VSpan,
@@ -27,7 +26,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, THESIS_TISSUE
+from davinci_forces.report.sections.parts import MM, THESIS_TISSUE, section_of
 from davinci_forces.report.verdicts import is_minority, stiffness_level
 
 FIGURES_ON_PAPER = 1  # figures of force, and as many maps, in the PDF; the others are on screen only
@@ -36,16 +35,12 @@ SAMPLES_PER_PUSH = 60  # samples drawn of each push in a panel of several pushes
 MAX_PUSHES_LISTED = 20  # pushes of a log; with more, a histogram of their stiffness replaces the loop of one push
 MIN_SPACING_MAP = 1e-3  # [m] extent of the pushed places, below which no map is drawn
 CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
+WAYS: tuple[tuple[int, str, Colour], ...] = ((1, "in", "blue"), (0, "out", "orange"))
 
 
-def section(context: Context) -> Section | None:
-    """All tissue logs; None if the study has no tissue log."""
-    tissues = context.catalogue.records(Stiffness)
-    return Section("Tissue", "tissue", tuple(blocks(context, tissues))) if tissues else None
-
-
-def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
-    """The section's content."""
+@section_of(Stiffness, "Tissue", "tissue")
+def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
+    """All tissue logs."""
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
         "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
@@ -75,11 +70,10 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        return Verdict(
-            "bad", f"{name}: a straight line explains 90 % of the force's variance in none of {pushes(len(tissue))}."
-        )
+        text = f"a straight line explains 90 % of the force's variance in none of {pushes(len(tissue))}"
+        return Verdict("bad", f"{name}: {text}.")
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
-    law = chosen_law(context, tissue.log)
+    law = next((model.chosen for model in context.catalogue.select(TissueModel, log=tissue.log)), "")
     text = f"{name}: {stiffness} from {tissue.pushes} of {pushes(len(tissue))}{f'; best model: {law}' if law else ''}"
     text += "; most pushes do not count" if is_minority(tissue) else ""
     true = context.true_stiffness(tissue.log)
@@ -89,20 +83,13 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     return Verdict(stiffness_level(tissue, true), f"{text}.")
 
 
-def chosen_law(context: Context, log: str) -> str:
-    """The model that predicts the pushes of a log best, or "" where none could be chosen."""
-    return next((model.chosen for model in context.catalogue.select(TissueModel, log=log)), "")
-
-
 def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     """One row a log; in simulations of the thesis's experiments, also the stiffness that the thesis states."""
     rows: list[tuple[Cell, ...]] = [
         (
             literal(tissue.log),
             "sensor" if tissue.source == "force sensor" else title(tissue.source),
-            context.number(f"tissue.{tissue.log}.stiffness"),
-            context.number(f"tissue.{tissue.log}.stiffness_q1"),
-            context.number(f"tissue.{tissue.log}.stiffness_q3"),
+            *context.numbers(f"tissue.{tissue.log}", ("stiffness", "stiffness_q1", "stiffness_q3"), 4),
             context.count(f"tissue.{tissue.log}.pushes"),
             f"{len(tissue)} of {tissue.swings}",
         )
@@ -111,14 +98,11 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force from", "Stiffness", "Quartile 1", "Quartile 3", "Used", "In contact")
-    return Table(
+    caption = (
         "Stiffness of the tissue, its quartiles over pushes, the number of used pushes, and the number of pushes with "
-        "contact among all examined pushes.",
-        header,
-        tuple(rows),
-        "tissue-table",
-        "llrrrrr",
+        "contact among all examined pushes."
     )
+    return Table(caption, header, tuple(rows), "tissue-table", "llrrrrr")
 
 
 def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
@@ -126,10 +110,8 @@ def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     pushes = {push.push: push for push in context.catalogue.select(Push, log=tissue.log)}
     typical = pushes.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
-        few = evenly(len(tissue), PUSHES_PER_PANEL)
-        yield force_figure(
-            tissue, [pushes[number] for number in tissue.push[few].tolist() if number in pushes], typical
-        )
+        few = tissue.push[evenly(len(tissue), PUSHES_PER_PANEL)].tolist()
+        yield force_figure(tissue, [pushes[number] for number in few if number in pushes], typical)
 
 
 def nearest(tissue: Stiffness) -> int:
@@ -173,25 +155,23 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
 
 def residual_panel(push: Push) -> Panel:
     """The residual of the straight line of one push."""
-    inside, loading = push.inside == 1, push.loading == 1
     residual = push.force - push.intercept - push.k_t * push.depth
-    marks: tuple[AnyMark, ...] = (HLine(0.0), *in_and_out(MM * push.depth, residual, inside, loading))
-    return Panel("Residual", "depth [mm]", "force [N]", marks)
+    return Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(push, residual)))
 
 
 def hysteresis_panel(push: Push) -> Panel:
     """The hysteresis of one push, with the force of the chosen model."""
-    inside, loading = push.inside == 1, push.loading == 1
     model = Line(MM * push.depth, push.fitted, "model", "black", "solid")
-    marks: tuple[AnyMark, ...] = (*in_and_out(MM * push.depth, push.force, inside, loading), model)
-    return Panel(f"Hysteresis of push {push.push}", "depth [mm]", "force [N]", marks)
+    heading = f"Hysteresis of push {push.push}"
+    return Panel(heading, "depth [mm]", "force [N]", (*in_and_out(push, push.force), model))
 
 
-def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tuple[Points, ...]:
+def in_and_out(push: Push, y: Column) -> Iterator[Points]:
     """The samples of contact on the way in and on the way out."""
-    into, out = inside & loading, inside & ~loading
-    first = Points(x[into], y[into], "in", "blue")
-    return (first, Points(x[out], y[out], "out", "orange")) if out.any() else (first,)
+    for loading, name, colour in WAYS:
+        way = (push.inside == 1) & (push.loading == loading)
+        if loading or way.any():
+            yield Points(MM * push.depth[way], y[way], name, colour)
 
 
 def spread_panel(tissue: Stiffness) -> Panel:

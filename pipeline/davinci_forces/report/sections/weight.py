@@ -19,6 +19,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import run_cells
 from davinci_forces.report.verdicts import PRECISE, mass_level, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
@@ -29,19 +30,7 @@ def section(context: Context) -> Section | None:
     weights, constants = context.catalogue.records(Weight), context.catalogue.records(TorqueConstant)
     if not weights and not constants:
         return None
-    content: list[Block] = [intro(), *([summary(context, weights)] if weights else [])]
-    content += (verdict(context, weight) for weight in weights)
-    content += [torque_constants(context, constants)] if constants else []
-    content += log_blocks(context, weights[0]) if weights else ()
-    if weights[1:]:
-        others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
-        content.append(OnScreen("The other runs with a mass", "other-masses", others))
-    return Section("Attached masses", "weight", tuple(content))
-
-
-def intro() -> Prose:
-    """Explain the estimate of a mass and its standard error."""
-    return Prose(
+    intro = Prose(
         "A mass on a link adds gravity and inertia to the effort of the joints. The mass is estimated as the slope of "
         "a line: the external effort of all moving joints that carry it, against the effort that 1 kg causes according "
         "to the robot's chain. The external effort is measured minus modelled effort, low-passed without delay. Each "
@@ -51,6 +40,14 @@ def intro() -> Prose:
         "It is increased if logs without a mass give a mass that its standard error does not explain, or if the masses "
         "that the joints give differ."
     )
+    content: list[Block] = [intro, *([summary(context, weights)] if weights else [])]
+    content += (verdict(context, weight) for weight in weights)
+    content += [torque_constants(context, constants)] if constants else []
+    content += log_blocks(context, weights[0]) if weights else ()
+    if weights[1:]:
+        others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
+        content.append(OnScreen("The other runs with a mass", "other-masses", others))
+    return Section("Attached masses", "weight", tuple(content))
 
 
 def summary(context: Context, weights: list[Weight]) -> Table:
@@ -59,51 +56,46 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         (
             literal(weight.log),
             literal(weight.moves_with),
-            "–" if math.isnan(weight.stated_mass) else str(Number(weight.stated_mass, "kg")),
+            str(Number(weight.stated_mass, "kg")),
             *context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale")),
             SIDES.get(weight.side, weight.side),
         )
         for weight in weights
     )
-    return Table(
+    caption = (
         "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
-        "two standard errors. The scale is the estimated mass divided by the stated mass.",
-        ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
-        rows,
-        "weight-table",
-        "llrrrrl",
+        "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
+    header = ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side")
+    return Table(caption, header, rows, "weight-table", "llrrrrl")
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
     """The torque constants that known masses give, beside those that are used."""
     rows = tuple(
         (
-            literal(of.log),
-            title(of.joint),
+            *run_cells(of),
             str(Number(of.stated_mass, "kg")),
-            "–" if math.isnan(of.torque_constant_used) else str(Number(of.torque_constant_used, "N m/A")),
+            str(Number(of.torque_constant_used, "N m/A")),
             context.number(f"weight.{of.log}.{of.joint}.torque_constant", 3),
         )
         for of in constants
     )
-    return Table(
+    caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
         "apply one, write it as `torque_constant` in study.toml. They assume the stated mass, its position and the "
-        "gear ratio. Joints whose current shows the mass too imprecisely are left out.",
-        ("Log", "Joint", "Known mass", "Used", "Proposed"),
-        rows,
-        "torque-constants",
-        "llrrr",
+        "gear ratio. Joints whose current shows the mass too imprecisely are left out."
     )
+    return Table(caption, ("Log", "Joint", "Known mass", "Used", "Proposed"), rows, "torque-constants", "llrrr")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     """The content about one log."""
     if weight.tare:
         yield disagreement(context, weight)
-    if loads := loads_of(context, weight):
+    loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
+    if loads := [load for load in loads if load.joint in weight.loaded]:
         yield figure(weight, loads)
     yield by_joint(context, weight)
     free = context.catalogue.select(FreeWeight, weight=weight.log)
@@ -136,12 +128,6 @@ def disagreement(context: Context, weight: Weight) -> Prose:
         "amount. The error of the model repeats along the path and cancels, so the standard error does not include it. "
         "A change between the two runs remains in the estimated mass."
     )
-
-
-def loads_of(context: Context, weight: Weight) -> list[Load]:
-    """The loads of the joints along the path of a log."""
-    loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
-    return [load for load in loads if load.joint in weight.loaded]
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
@@ -181,16 +167,14 @@ def by_joint(context: Context, weight: Weight) -> Table:
     together = (
         f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
     )
-    return Table(
+    caption = (
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at the stated position and "
         "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
         f"standard error of the mass includes it.{together if len(rows) > 1 else ''} Also the offset of the day, and "
-        "the root mean squares of the residual with the mass and of the model's error in free motion.",
-        ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion"),
-        rows,
-        f"weight-joints-{weight.log}",
-        "lrrrrrr",
+        "the root mean squares of the residual with the mass and of the model's error in free motion."
     )
+    header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")
+    return Table(caption, header, rows, f"weight-joints-{weight.log}", "lrrrrrr")
 
 
 def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Table:
@@ -198,13 +182,9 @@ def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Tab
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free
     )
-    widening = context.number(f"weight.{weight.log}.widening", 3)
-    return Table(
+    caption = (
         f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
         "logs are predicted by fits without these logs. Apparent masses beyond their errors widen all standard "
-        f"errors, here by the factor {widening}.",
-        ("Log", "Role", "Mass"),
-        rows,
-        f"weight-free-{weight.log}",
-        "llr",
+        f"errors, here by the factor {context.number(f'weight.{weight.log}.widening', 3)}."
     )
+    return Table(caption, ("Log", "Role", "Mass"), rows, f"weight-free-{weight.log}", "llr")

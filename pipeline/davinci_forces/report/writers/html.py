@@ -12,7 +12,6 @@ from davinci_forces.report.content import Document, Equation, Figure, Figure3D, 
 from davinci_forces.report.content.inline import Span, parse, printable
 from davinci_forces.report.content.layout import columns, flatten, marked_texts, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
 from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
 from davinci_forces.report.writers.pictures import NAMES, address, looks, shrink
 from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
@@ -25,6 +24,7 @@ LARGEST = 3_400_000  # [bytes] of the whole file; the traces get the space that 
 POINT_BYTES = 11  # per point of a trace: two numbers in single precision, in base 64
 MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # points of one zoomable figure
 STILL_POINTS = 2_000  # points of a figure that does not zoom, for saving its numbers
+FOLDED_POINTS = 600  # points of the picture of a trace on screen only, which the trace replaces
 SIGN = "\0"  # placeholder; no text contains this unprintable character
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 REVIEW_SCRIPTS = ("review.js",)
@@ -46,7 +46,8 @@ def render(document: Document) -> bytes:
     figures = {item.anchor: item.block for item in flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
     folded = on_screen(placed)
-    formulas, symbols = draw_formulas(_formulas(document))
+    display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
+    formulas, symbols = draw_formulas([*(Formula(maths, False) for maths in marked_texts(document, "maths")), *display])
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
         "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
@@ -56,7 +57,7 @@ def render(document: Document) -> bytes:
         ],
         "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
-    still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
+    still = {name: figure for name, figure in figures.items() if name not in zooms}
     numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
     kept = {name: (numbers_json(one.figure), one.note) for name, one in numbers.items()}
     text = _fill(page, [*kept, *zooms])
@@ -76,9 +77,9 @@ def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
 
 
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
-    """The data URL of a figure's picture; for a trace on screen only, a small picture that the trace replaces."""
-    if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
-        return address(miniature(figure, SMALL if figure.small else LARGER))
+    """The data URL of a figure's picture; that of a trace on screen only has few points."""
+    if on_screen_only and isinstance(figure, Figure) and figure.zoomable:
+        figure = thin_figure(figure, FOLDED_POINTS).figure
     return address(shrink(svg(figure)))
 
 
@@ -98,11 +99,6 @@ def _script(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
-def _formulas(document: Document) -> list[Formula]:
-    display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
-    return [Formula(maths, False) for maths in marked_texts(document, "maths")] + display
-
-
 def _fill(page: Json, names: list[str]) -> str:
     """The page, with signs in place of the numbers of the named figures and of the notes on them."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -112,9 +108,12 @@ def _fill(page: Json, names: list[str]) -> str:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, finalize=_finalize,
     )  # fmt: skip
-    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup, "attribute": _attribute}
+    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup}
+    # A data URL as the value of an attribute: it has no quotation mark, and `<` needs no escape.
+    environment.filters["attribute"] = lambda text: Markup(text.replace("&", "&amp;"))
     numbers = {name: [Markup(f"{SIGN}{part} {name}{SIGN}") for part in ("numbers", "note")] for name in names}
-    hashes = [_hash(text) for text in page["scripts"]]
+    # The hashes by which the content security policy allows the scripts to run.
+    hashes = [f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}" for text in page["scripts"]]
     return environment.get_template("report.html").render(page, numbers=numbers, hashes=hashes)
 
 
@@ -123,25 +122,16 @@ def _finalize(value: Any) -> Any:
     return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
-def _attribute(text: str) -> "Markup":
-    """A data URL as the value of an attribute; it has no quotation mark, and `<` needs no escape."""
-    from markupsafe import Markup
-
-    return Markup(text.replace("&", "&amp;"))
-
-
-def _hash(text: str) -> str:
-    """The hash by which the content security policy allows a script to run."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
 def _inline(page: Json) -> Callable[[str], "Markup"]:
     """A filter from marked text to HTML."""
     from markupsafe import Markup
 
     def convert(span: Span) -> Markup:
         if span.kind == "maths":
-            return _maths(span.text, page["formulas"][Formula(span.text, False)])
+            drawing: Drawing = page["formulas"][Formula(span.text, False)]
+            size = f"width:{drawing.width:.3f}em;height:{drawing.height:.3f}em;vertical-align:{-drawing.depth:.3f}em"
+            formula = '<svg class="maths" role="img" aria-label="{}" viewBox="{}" style="{}">{}</svg>'
+            return Markup(formula).format(span.text, drawing.view, size, Markup(drawing.body))
         if span.kind == "reference":
             return Markup('<a href="#{}">{}</a>').format(span.text, page["references"][span.text])
         if span.kind == "link":
@@ -149,12 +139,3 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
         return Markup(HTML_FORMATS[span.kind]).format(span.text)
 
     return lambda text: Markup("").join(map(convert, parse(text)))
-
-
-def _maths(text: str, drawing: Drawing) -> "Markup":
-    from markupsafe import Markup
-
-    style = f"width:{drawing.width:.3f}em;height:{drawing.height:.3f}em;vertical-align:{-drawing.depth:.3f}em"
-    return Markup('<svg class="maths" role="img" aria-label="{}" viewBox="{}" style="{}">{}</svg>').format(
-        text, drawing.view, style, Markup(drawing.body)
-    )

@@ -24,7 +24,10 @@ CODED_STEPS = 8  # between neighbouring samples of a column that increases
 def numbers_json(figure: Figure | Figure3D) -> str:
     """The figure as JSON without any text that could close the HTML element around it."""
     columns: dict[str, int] = {}  # encoded column -> its index; marks share equal columns
-    panels = figure.panels if isinstance(figure, Figure) else (_space(figure),)
+    if isinstance(figure, Figure):
+        panels = figure.panels
+    else:  # marks in space, in the form of a panel's marks
+        panels = (Panel("", figure.x_label, f"{figure.y_label}, {figure.z_label}", figure.marks),)  # type: ignore[arg-type]
     content = {
         "across": figure.columns if isinstance(figure, Figure) else 1,
         "height": round(figure.height * PIXELS),
@@ -32,11 +35,6 @@ def numbers_json(figure: Figure | Figure3D) -> str:
         "columns": [json.loads(column) for column in columns],
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
-def _space(figure: Figure3D) -> Panel:
-    """The marks in space, in the form of a panel's marks."""
-    return Panel("", figure.x_label, f"{figure.y_label}, {figure.z_label}", figure.marks)  # type: ignore[arg-type]
 
 
 def _panel(panel: Panel, columns: dict[str, int]) -> Json:
@@ -72,12 +70,8 @@ def _encode(column: Array, linear: bool) -> str:
         return json.dumps([float(column[0]), step, len(column)])
     known = column[np.isfinite(column)]
     low, step = (float(known.min()), float(np.ptp(known)) / CODES) if len(known) else (0.0, 0.0)
-    if (
-        linear
-        and len(column) > FEW_VALUES
-        and step > 0
-        and (CODED_STEPS * step <= _typical_step(column) or not is_sorted(known))
-    ):
+    is_coarse = linear and len(column) > FEW_VALUES and step > 0
+    if is_coarse and (CODED_STEPS * step <= _typical_step(column) or not is_sorted(known)):
         codes = np.where(np.isfinite(column), np.rint((column - low) / step), CODES + 1).astype("<u2")
         return json.dumps(f"h{low!r},{step!r},{base64.b64encode(codes.tobytes()).decode()}")
     close = float(np.nanmax(np.abs(column), initial=0.0)) > 2**20 * _typical_step(column)
@@ -125,10 +119,8 @@ def thin_figure(figure: Figure | Figure3D, limit: int) -> ThinnedFigure:
         return ThinnedFigure(figure, samples, samples)
     sizes = [points_of(mark) for panel in figure.panels for mark in panel.marks]
     shares = iter(_share_points(sizes, limit))
-    panels = tuple(
-        replace(panel, marks=tuple(thin_mark(m, next(shares)) for m in panel.marks)) for panel in figure.panels
-    )
-    result = replace(figure, panels=panels)
+    thinned = ((panel, tuple(thin_mark(mark, next(shares)) for mark in panel.marks)) for panel in figure.panels)
+    result = replace(figure, panels=tuple(replace(panel, marks=marks) for panel, marks in thinned))
     return ThinnedFigure(result, figure.samples, result.samples)
 
 

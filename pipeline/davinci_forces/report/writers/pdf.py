@@ -63,26 +63,21 @@ def _inline(text: str) -> list[Json]:
     return [span._asdict() for span in parse(text)]
 
 
-def _paragraphs(text: str) -> list[list[Json]]:
-    return [_inline(paragraph.strip()) for paragraph in text.split("\n\n") if paragraph.strip()]
-
-
 def _table(table: Table) -> Json:
     rows = table.rows if table.printed is None else tuple(table.rows[i] for i in table.printed)
     more = f" {len(table.rows) - len(rows)} more in the HTML report." * (len(rows) < len(table.rows))
     shown = columns(replace(table, rows=rows))
-    cells = [[_inline(_unbroken(cell.text, column.align)) for cell in column.cells] for column in shown]
+    # What stands to the right is a number, of which the unit is not parted.
+    cells = [
+        [_inline(cell.text.replace(" ", NO_BREAK) if column.align == "r" else cell.text) for cell in column.cells]
+        for column in shown
+    ]
     return {
         "caption": _inline(table.caption + more),
         "aligns": [column.align for column in shown],
         "header": [_inline(column.head) for column in shown],
         "rows": [list(row) for row in zip(*cells, strict=True)],
     }
-
-
-def _unbroken(text: str, align: str) -> str:
-    """A cell as its column has it: what stands to the right is a number, of which the unit is not parted."""
-    return text.replace(" ", NO_BREAK) if align == "r" else text
 
 
 def _figure(figure: Figure | Figure3D) -> Json:
@@ -93,7 +88,7 @@ def _figure(figure: Figure | Figure3D) -> Json:
 DATA: dict[type, Callable[[Any], Json]] = {
     Section: lambda section: {"title": _inline(section.title)},
     OnScreen: lambda folded: {"title": _inline(folded.title)},
-    Prose: lambda prose: {"paragraphs": _paragraphs(prose.text)},
+    Prose: lambda prose: {"paragraphs": [_inline(part.strip()) for part in prose.text.split("\n\n") if part.strip()]},
     Bullets: lambda bullets: {"items": [_inline(item) for item in bullets.items]},
     Listing: lambda listing: {"text": printable(listing.text)},
     Verdict: lambda verdict: {"level": verdict.level, "text": _inline(verdict.text)},

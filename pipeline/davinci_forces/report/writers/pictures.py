@@ -1,7 +1,7 @@
 """Figures as pictures of a page: SVG small enough to travel in it, which turns dark with the page."""
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from urllib.parse import quote
 
 from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS
@@ -25,30 +25,18 @@ def address(svg: str) -> str:
 
 
 def shrink(svg: str) -> str:
-    """The same picture in a third of the characters: styles as classes, colours as variables, no unused names."""
-    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
-    svg = svg.replace("xlink:href", "href").replace(' xmlns:xlink="http://www.w3.org/1999/xlink"', "")
-    svg = re.sub(r">\s+<", "><", svg)
-    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg))
+    """The same picture in a third of the characters: styles as classes, and colours as variables."""
     styles: dict[str, str] = {}
-    svg = _in_tags(svg, lambda tag: _short_tag(tag, used, styles))
-    svg = _without_empty_groups(svg)
-    svg = re.sub(r"(<svg [^>]*>)", lambda tag: tag[1] + _sheet(svg, styles), svg, count=1)
-    return _in_tags(svg, lambda tag: tag.replace('"', "'"))  # which a data URL need not escape
 
+    def shorten(tag: re.Match[str]) -> str:
+        """A tag with a class for its style, and quotation marks that a data URL need not escape."""
+        short = re.sub(
+            r' style="([^"]*)"', lambda style: f' class="{styles.setdefault(style[1], _letters(len(styles)))}"', tag[0]
+        )
+        return short.replace('"', "'")
 
-def _in_tags(svg: str, change: Callable[[str], str]) -> str:
-    """Apply a change to the tags of an SVG, not to its text; in text, `<` is escaped."""
-    return re.sub(r"<[^<>]+>", lambda tag: change(tag[0]), svg)
-
-
-def _short_tag(tag: str, used: set[str], styles: dict[str, str]) -> str:
-    def name_class(style: re.Match[str]) -> str:
-        return f' class="{styles.setdefault(style[1], _letters(len(styles)))}"'
-
-    tag = re.sub(r' id="([^"]+)"', lambda name: name[0] if name[1] in used else "", tag)
-    tag = re.sub(r' transform="rotate\(-0 [^"]*"', "", tag)
-    return re.sub(r' style="([^"]*)"', name_class, tag).replace("\n", " ")
+    start, *rest = re.split("(?<=>)", re.sub(r"<[^<>]+>", shorten, svg), maxsplit=1)
+    return start + _sheet(styles) + "".join(rest)
 
 
 def _letters(number: int) -> str:
@@ -59,15 +47,7 @@ def _letters(number: int) -> str:
     return name
 
 
-def _without_empty_groups(svg: str) -> str:
-    """The SVG without groups that have no attributes."""
-    before = ""
-    while before != svg:
-        before, svg = svg, re.sub(r"<g>((?:(?!</?g\b).)*)</g>", r"\1", svg, flags=re.DOTALL)
-    return svg.replace("<defs></defs>", "").replace("<defs/>", "")
-
-
-def _sheet(svg: str, styles: dict[str, str]) -> str:
+def _sheet(styles: dict[str, str]) -> str:
     """The style sheet of a picture: its classes, and its colours in light and dark."""
     classes = "".join(f".{name}{{{_declarations(style)}}}" for style, name in styles.items())
     light, dark = looks([name for name in NAMES.values() if f"var(--{name})" in classes])
@@ -78,9 +58,6 @@ def _sheet(svg: str, styles: dict[str, str]) -> str:
 
 
 def _declarations(style: str) -> str:
-    def name_colour(colour: re.Match[str]) -> str:
-        return f"var(--{NAMES[colour[0]]})" if colour[0] in NAMES else colour[0]
-
     style = re.sub(r"font-family: [^;]*", f"font-family:{FONT}", style)
-    style = re.sub(r"#[0-9a-f]{6}", name_colour, style)
-    return re.sub(r"\s*([:;,])\s*", r"\1", style).strip(";")
+    style = re.sub("#[0-9a-f]{6}", lambda colour: f"var(--{NAMES[colour[0]]})", style)
+    return re.sub(r"\s*([:;,])\s*", r"\1", style)

@@ -95,14 +95,12 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
         called = f"<joint name={joint.name!r}>"
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
-                file.note(
-                    joint.line, f"{called} <{end}>: there is no <link name={link!r}>; add it, or correct the name"
-                )
+                missing = f"there is no <link name={link!r}>; add it, or correct the name"
+                file.note(joint.line, f"{called} <{end}>: {missing}")
         if joint.child in parent_joints:
             parent = parent_joints[joint.child].name
-            file.note(
-                joint.line, f"{called}: link {joint.child!r} already has the parent joint {parent!r}; cut the loop"
-            )
+            loop = f"link {joint.child!r} already has the parent joint {parent!r}; cut the loop"
+            file.note(joint.line, f"{called}: {loop}")
         parent_joints.setdefault(joint.child, joint)
     bases = [name for name in links if name not in parent_joints]
     notes = Notes(file, outermost)

@@ -64,9 +64,8 @@ class _Turned(NamedTuple):
 def _turned(robot: Robot, chain: Chain, friction: Mapping[str, tuple[float, float]]) -> _Turned:
     """Express the robot in the named frames of its links, as far as these are on the joint axes."""
     frames = chain.of_links.copy()
-    frames[frames[:, :3, 3].any(axis=1)] = np.eye(
-        4
-    )  # the named frame is not at the joint: keep the frame of the dynamics
+    # Where the named frame is not at the joint, the frame of the dynamics is kept.
+    frames[frames[:, :3, 3].any(axis=1)] = np.eye(4)
     by_body = np.concatenate([np.eye(4)[None], frames])
     back = np.linalg.inv(by_body)
     return _Turned(
@@ -85,7 +84,10 @@ def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
     taken = set(turned.links)
     for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
         if name not in taken or not np.allclose(offset, np.eye(4), rtol=0, atol=FRAME_TOLERANCE):
-            yield from _fixed(_unused(name, taken), turned.links[body], offset)
+            while name in taken:  # a suffix distinguishes a frame from a link of the same name
+                name = f"{name}_frame"
+            taken.add(name)
+            yield from _fixed(name, turned.links[body], offset)
     if TIP not in taken:  # readers recognise the tip by this name
         at = chain.names.index(chain.tip)
         yield from _fixed(TIP, turned.links[chain.body[at]], turned.offset[at])
@@ -147,14 +149,6 @@ def _origin(parent: str, child: str, placement: Array) -> Iterator[str]:
     yield f"  <parent link={quoteattr(parent)}/>"
     yield f"  <child link={quoteattr(child)}/>"
     yield f'  <origin xyz="{_numbers(placement[:3, 3])}" rpy="{_numbers(roll_pitch_yaw(placement[:3, :3]))}"/>'
-
-
-def _unused(name: str, taken: set[str]) -> str:
-    """A name that no link has yet: a suffix distinguishes a frame from a link of the same name."""
-    while name in taken:
-        name = f"{name}_frame"
-    taken.add(name)
-    return name
 
 
 def _numbers(values: object) -> str:

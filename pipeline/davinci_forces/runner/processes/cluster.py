@@ -7,16 +7,14 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from platform import python_version
 from time import sleep
 from uuid import uuid4
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.files import digest
 from davinci_forces.runner.execution import Outcome, perform
-from davinci_forces.runner.fingerprints.code import PACKAGE
-from davinci_forces.runner.fingerprints.fingerprint import hash_of
+from davinci_forces.runner.fingerprints.code import package_fingerprint
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic
@@ -39,15 +37,9 @@ class Terms:
 @cache
 def own_terms(mark: str = "") -> Terms:
     """The terms that this process meets."""
-    code = {file.relative_to(PACKAGE).as_posix(): digest(file) for file in sorted(PACKAGE.rglob("*.py"))}
-    versions = {"Python": python_version(), "arithmetic": arithmetic.description()}
-    versions["instructions"] = arithmetic.instructions()
-    for name in RESULT_PACKAGES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "missing"
-    return Terms(mark, hash_of(code), tuple(versions.items()))
+    versions = {name: version(name) for name in RESULT_PACKAGES} | {"Python": python_version()}
+    versions |= {"arithmetic": arithmetic.description(), "instructions": arithmetic.instructions()}
+    return Terms(mark, package_fingerprint(), tuple(versions.items()))
 
 
 def perform_there(terms: Terms, folders: Folders, task: Task) -> Outcome:

@@ -4,9 +4,11 @@ from davinci_forces.logs.isolated import process
 
 process.end_with_parent()  # first, because importing takes seconds
 
-from davinci_forces.runner import execution  # noqa: E402
-from davinci_forces.runner.processes import workers  # noqa: E402
+from importlib import import_module  # noqa: E402
 
-__all__ = ["execution"]
+from davinci_forces.runner import execution as execution  # noqa: E402
+from davinci_forces.runner.processes import workers as workers  # noqa: E402
+from davinci_forces.stages import STAGES, module  # noqa: E402
 
-workers.import_stages()
+for name in STAGES:
+    import_module(module(name))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from concurrent.futures import wait as wait_for
 from dataclasses import dataclass
-from importlib import import_module
 from multiprocessing import get_all_start_methods, get_context, parent_process
 from multiprocessing.connection import wait
 from queue import SimpleQueue
@@ -19,7 +18,6 @@ from davinci_forces.logs.isolated import process
 from davinci_forces.maths import compiled
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.plan import Task
-from davinci_forces.stages import STAGES, module
 
 Perform = Callable[[Task], Outcome]
 Share = list[tuple[Perform, Task]]
@@ -63,12 +61,6 @@ def end_with_parent() -> None:
 def _await(sentinel: int) -> None:
     wait([sentinel])
     os._exit(1)
-
-
-def import_stages() -> None:
-    """Import the modules of all stages."""
-    for name in STAGES:
-        import_module(module(name))
 
 
 def perform_all(share: Sequence[tuple[Perform, Task]]) -> list[Fields]:
@@ -201,14 +193,10 @@ class TaskQueue:
         for future in done:
             share = self._running.pop(future, None)
             if share is not None:  # it was not lost
-                yield from self._share_outcomes(share, future.result())
-
-    def _share_outcomes(self, share: Share, results: Sequence[Fields]) -> Iterator[Outcome]:
-        """The outcomes of the tasks of a share; their durations are learnt."""
-        for (_, task), fields in zip(share, results, strict=True):
-            outcome = Outcome(task, **fields)
-            self._learn(task, outcome.seconds)
-            yield outcome
+                for (_, task), fields in zip(share, future.result(), strict=True):
+                    outcome = Outcome(task, **fields)
+                    self._learn(task, outcome.seconds)
+                    yield outcome
 
     def _replace(self) -> None:
         """Replace the pool after one of its processes was killed.

@@ -12,6 +12,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.arm import (
     ArmExcitationProblem,
+    ReportStart,
     arm_observation,
     arm_problem,
     design_together,
@@ -20,7 +21,6 @@ from davinci_forces.maths.excitation.arm import (
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
 from davinci_forces.maths.excitation.joint import ExcitationProblem
 from davinci_forces.maths.excitation.limits import ArmLimits, Box, Obstacles
-from davinci_forces.maths.excitation.search import ReportStart, ignore_start
 from davinci_forces.maths.models.coupled import LINK_UNITS
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.robots.robot import Joint, Kind, Robot
@@ -74,7 +74,7 @@ class Answer(NamedTuple):
     arm: ArmExcitation | None = None
 
 
-def answer(request: Request, report_start: ReportStart = ignore_start) -> Answer:
+def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
     """Design or evaluate a trajectory for each requested joint; `report_start` reports each start for an arm.
 
     Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
@@ -110,7 +110,7 @@ def answer(request: Request, report_start: ReportStart = ignore_start) -> Answer
 
 
 def _of_arm(
-    request: Request, robot: Robot, problem: ArmExcitationProblem, noise: list[float], report_start: ReportStart
+    request: Request, robot: Robot, problem: ArmExcitationProblem, noise: list[float], report_start: ReportStart | None
 ) -> Answer:
     try:
         design = design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)

@@ -43,7 +43,10 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
     clock = table.text("clock", "channel", ("channel", "header"))
     unit = table.text("current_unit", "A", ("A", "mA"))
     log = SimulatedLog(name, file, role, duration, moves, held, pushes, unit, clock)
-    logs = _of_arm(table, log, joints, families) if families else _of_joints(table, log)
+    logs = _of_arm(table, log, joints, families) if families else [log]
+    for key in (key for key, move in moves.items() if isinstance(move, Path) and not families):
+        problem = f"moves.{key} is a path; joints that follow their model exactly need a Fourier series"
+        table.problem(problem, "moves", key)
     table.close()
     return logs
 
@@ -62,14 +65,6 @@ def _check_joints(
         table.problem("no joint moves; add a table moves")
 
 
-def _of_joints(table: TomlTable, log: SimulatedLog) -> list[SimulatedLog]:
-    for key, move in log.moves.items():
-        if isinstance(move, Path):
-            problem = f"moves.{key} is a path; joints that follow their model exactly need a Fourier series"
-            table.problem(problem, "moves", key)
-    return [log]
-
-
 def _of_arm(
     table: TomlTable, log: SimulatedLog, joints: dict[str, SimulatedJoint], families: Sequence[str]
 ) -> list[SimulatedLog]:
@@ -85,8 +80,16 @@ def _of_arm(
             table.problem(f"{name} starts at {start:g}, beyond its stops {low:g} and {high:g}", *keys)
     mass = table.number("mass", 0.0, low=0.0)
     tip = tuple(_push(entry, log.duration, True) for entry in table.tables("tip"))
-    tissue = _tissue(table.table("tissue")) if "tissue" in table else None
-    sensor = _sensor(table.table("sensor")) if "sensor" in table else None
+    tissue, sensor = None, None
+    if "tissue" in table:
+        entry = table.table("tissue")
+        damping = entry.number("damping", 0.0, low=0.0)
+        tissue = Tissue(entry.number("surface"), entry.number("stiffness", above=0.0), damping)
+        entry.close()
+    if "sensor" in table:
+        entry = table.table("sensor")
+        sensor = ForceSensor(entry.number("noise", 0.0, low=0.0), entry.number("lag", 0.0, low=0.0))
+        entry.close()
     recorded_families = table.texts("families", list(families), families)
     roles_table = table.table("role_in")
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
@@ -134,17 +137,3 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
         table.problem(f"end = {end:g} s is after the end of the recording at {duration:g} s", "end")
     table.close()
     return SimulatedPush(shape, start, end, peak, direction)
-
-
-def _sensor(table: TomlTable) -> ForceSensor:
-    sensor = ForceSensor(table.number("noise", 0.0, low=0.0), table.number("lag", 0.0, low=0.0))
-    table.close()
-    return sensor
-
-
-def _tissue(table: TomlTable) -> Tissue:
-    tissue = Tissue(
-        table.number("surface"), table.number("stiffness", above=0.0), table.number("damping", 0.0, low=0.0)
-    )
-    table.close()
-    return tissue

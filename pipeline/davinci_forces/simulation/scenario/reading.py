@@ -9,6 +9,7 @@ import numpy as np
 
 from davinci_forces import robots, toml
 from davinci_forces.errors import BadRobot
+from davinci_forces.haptics.scenario import read_friction, read_stops
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.simulation.actuators import Cascade, Motors, Regulator
 from davinci_forces.maths.simulation.step import Friction
@@ -80,9 +81,8 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
 
 def _robot(table: TomlTable) -> Robot:
     name = table.text("robot", choices=robots.ROBOTS)
-    return robots.load(
-        name if name in robots.ROBOTS else "davinci", File()
-    )  # a wrong name is noted; read the file to its end with another robot
+    # A wrong name is noted, and the file read to its end with another robot.
+    return robots.load(name if name in robots.ROBOTS else "davinci", File())
 
 
 def _joint(robot: Robot, name: str, table: TomlTable, whole_arm: bool) -> SimulatedJoint:
@@ -99,11 +99,9 @@ def _joint(robot: Robot, name: str, table: TomlTable, whole_arm: bool) -> Simula
         values.close()
     label = table.text("label", joint.title)
     encoder, current = table.number("encoder_step", 0.0, low=0.0), table.number("current_step", 0.0, low=0.0)
-    low, high = table.numbers("stops", [-1e9, 1e9], count=2) or (-math.inf, math.inf)
-    if low >= high:
-        table.problem(f"stops must be lower and upper, not {low:g} and {high:g}", "stops")
+    stops = read_stops(table, (-1e9, 1e9))
     table.close()
-    return SimulatedJoint(joint, label, encoder, current, (low, high), noise, theta)
+    return SimulatedJoint(joint, label, encoder, current, stops, noise, theta)
 
 
 def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) -> SimulatedArm:
@@ -138,10 +136,8 @@ def _control(table: TomlTable, n: int) -> Cascade | Regulator:
     if name == "none":
         law = Regulator(np.zeros(n), np.zeros(n), np.zeros(n), 0.0)
     elif name == "pid":
-        proportional, derivative, integral = (
-            _list(table, key, n) for key in ("proportional", "derivative", "integral")
-        )
-        law = Regulator(proportional, derivative, integral, table.number("gravity", 1.0, low=0.0))
+        K_p, K_d, K_i = (_list(table, key, n) for key in ("proportional", "derivative", "integral"))
+        law = Regulator(K_p, K_d, K_i, table.number("gravity", 1.0, low=0.0))
     else:
         law = Cascade(*(_list(table, key, n) for key in Cascade._fields))
     table.close()
@@ -149,11 +145,9 @@ def _control(table: TomlTable, n: int) -> Cascade | Regulator:
 
 
 def _list(table: TomlTable, key: str, n: int, positive: bool = False) -> Array:
-    values = table.numbers(key, count=n)
+    values, sign = table.numbers(key, count=n), "be greater than 0" if positive else "not be negative"
     if any(value < 0 or (positive and value == 0) for value in values):
-        table.problem(
-            f"{key} must {'be greater than 0' if positive else 'not be negative'}, but is {list(values)}", key
-        )
+        table.problem(f"{key} must {sign}, but is {list(values)}", key)
     return np.array(values if len(values) == n else [1.0] * n)
 
 
@@ -161,25 +155,12 @@ def _family(table: TomlTable, robot: Robot) -> Family:
     rows, noise = [], {}
     for joint in robot.joints:
         entry = table.table(joint.name)
-        rows.append(_friction(entry))
+        viscous, coulomb, static, *stribeck_and_bristles = read_friction(entry)
+        rows.append((viscous, *coulomb, *static, *stribeck_and_bristles))
         noise[joint.name] = noise_of(entry)
         entry.close()
     table.close()
     return Family(Friction(*(np.array(column) for column in zip(*rows, strict=True))), noise)
-
-
-def _friction(table: TomlTable) -> tuple[float, ...]:
-    coulomb = table.numbers("coulomb", count=2) or (1.0, 1.0)
-    static = table.numbers("static", list(coulomb), count=2) or coulomb
-    for key, values in (("coulomb", coulomb), ("static", static)):
-        if min(values) < 0:
-            table.problem(f"{key} must be two numbers that are not negative, up and down, but is {list(values)}", key)
-    stiffness = table.number("bristle_stiffness", 0.0, low=0.0)
-    if stiffness > 0 and min(coulomb) <= 0:
-        table.problem("bristles need Coulomb friction greater than 0", "coulomb")
-    velocity = table.number("stribeck_velocity", 0.01, above=0.0)
-    damping = table.number("bristle_damping", 0.0, low=0.0)
-    return (table.number("viscous", low=0.0), *coulomb, *static, velocity, stiffness, damping)
 
 
 def noise_of(table: TomlTable) -> SensorNoise:

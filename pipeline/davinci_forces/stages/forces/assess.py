@@ -5,17 +5,24 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
+from davinci_forces.maths.contact.detection import (
+    FreeMotionStatistics,
+    alarm_level,
+    free_motion_statistics,
+    typical_alarm_level,
+)
 from davinci_forces.maths.signals.windows import free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
-from davinci_forces.records import FreeSpace, Threshold, Track
+from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MIN_SAMPLES_LEVEL = 100  # of free space
+TOUCHED = 3.0  # largest effort of a log over its typical alarm level; recorded free motion stays below 1.7
 
 
-def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
+def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Diagnostic]:
     """Compute the levels of one moving joint, by smoother and by filter, in a log in which contacts are known.
 
     Standstill is left out: friction takes any value up to its static level, which hides a small external effort.
@@ -26,6 +33,22 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     smoothed, filtered = (which(*place) for which in (free_smoothed, free_space))
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
+    if entry.role != "contact" and int(smoothed.sum()) >= MIN_SAMPLES_LEVEL:
+        yield from touch_warning(track, smoothed, robot)
+
+
+def touch_warning(track: Track, free: Booleans, robot: Robot) -> Iterator[Diagnostic]:
+    """Warn of efforts in free motion (N,) that are far above those of the rest of the log, as touches are."""
+    size = np.where(free, np.abs(track.tau_ext_smooth), 0.0)
+    level = typical_alarm_level(track.tau_ext_smooth, free, track.rate)
+    if size.max() > TOUCHED * level > 0.0:
+        effort = f"{size.max():.2g} {robot.joint(track.joint).unit('{effort}')}"
+        message = (
+            f"{track.log}/{track.joint}: at {track.t[size.argmax()]:.2f} s something seems to touch the arm: the "
+            f"external effort is {effort}, {size.max() / level:.0f} times as large as elsewhere in the log; "
+            "give the log the role contact, or state its contact windows"
+        )
+        yield diagnostic("assess", f"{track.log}.{track.joint}", "warning", message)
 
 
 def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans) -> Iterator[FreeSpace]:
@@ -65,7 +88,8 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     for joint, joint_spaces in by_joint.items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
-        level, source = max(((alarm_level_of(space), space) for space in unfitted), key=lambda pair: pair[0])
+        statistics = ([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)] for space in unfitted)
+        level, source = max(zip(map(alarm_level, statistics), unfitted, strict=True), key=lambda pair: pair[0])
         yield Threshold(
             joint, SMOOTHER, worst.detection_level, worst.detection_level_std, level,
             level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log, len(unfitted),
@@ -79,8 +103,3 @@ def pooled_coverage(spaces: list[FreeSpace]) -> tuple[float, float]:
     by_blocks = float(np.sqrt(np.sum(errors**2))) / len(shares)
     by_logs = float(np.std(shares, ddof=1)) / len(shares) ** 0.5 if len(shares) >= MIN_LOGS_BAND else 0.0
     return float(shares.mean()), max(by_blocks, by_logs)
-
-
-def alarm_level_of(space: FreeSpace) -> float:
-    """Alarm level: the effort that free motion exceeds at most once in ten minutes; it grows with its rms."""
-    return alarm_level([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)])

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import Event, events, summarise
+from davinci_forces.maths.contact.detection import Event, events, summarise, typical_alarm_level
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -20,6 +20,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     """Measure the contacts of one joint: in windows that the study states, and others above the alarm level.
 
     At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
+    In the last moments of a log the smoother has no later samples, so no contact begins there.
     A window on a joint at rest counts only if a contact was detected in it.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
     """
@@ -30,12 +31,12 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
-    converged = is_past_transient(track.t)
-    alarm_level = threshold.alarm_level + unknown_friction(track)
+    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - track.smooth_rise)
+    level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
-        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, alarm_level, track.smooth_rise)
-        if converged[np.searchsorted(track.t, event.onset).clip(0, len(converged) - 1)]
+        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, level, track.smooth_rise)
+        if steady[np.searchsorted(track.t, event.onset).clip(0, len(steady) - 1)]
     ]
     pairs = match_windows(sorted(entry.contact), detected)
     placed = [(window, event, stated) for window, event, stated in pairs if event or not track.at_rest]
@@ -47,7 +48,7 @@ def match_windows(windows: Sequence[Window], detected: Sequence[Event]) -> Itera
     """Pair each stated window with the contact that was detected in it; then yield the contacts without a window."""
     unstated = set(detected)
     for start, end in windows:
-        inside = [e for e in detected if e.onset >= start - WINDOW_MARGIN and e.release <= end + WINDOW_MARGIN]
+        inside = [e for e in detected if is_within(e, (start - WINDOW_MARGIN, end + WINDOW_MARGIN))]
         unstated -= set(inside)
         first, last = (inside[0], inside[-1]) if inside else (None, None)
         event = Event(*first[:2], *last[2:]) if first and last else None
@@ -56,6 +57,24 @@ def match_windows(windows: Sequence[Window], detected: Sequence[Event]) -> Itera
     for event in detected:
         if event in unstated and not any(event.onset < end and event.release > start for start, end in widened):
             yield (event.onset, event.release), event, False
+
+
+def is_within(event: Event, window: Window) -> bool:
+    """Whether a contact and a window share at least half of the shorter of the two."""
+    shared = min(event.release, window[1]) - max(event.onset, window[0])
+    return shared > 0.0 and shared >= 0.5 * min(event.release - event.onset, window[1] - window[0])
+
+
+def level_while_identified(track: Track, entry: LogEntry) -> float:
+    """The largest effort in a log that identifies, up to twice its typical alarm level; 0 in other logs.
+
+    Nothing should touch the arm in such a log.  Only what is far from the rest of it counts as a contact.
+    """
+    free = free_smoothed(track.t, entry.contact, track.rate, track.unscored)
+    if entry.role != "identification" or not free.any():
+        return 0.0
+    largest = float(np.abs(track.tau_ext_smooth[free]).max())
+    return min(largest, 2.0 * typical_alarm_level(track.tau_ext_smooth, free, track.rate))
 
 
 def contacts(
@@ -83,16 +102,7 @@ def contacts(
         "peak_std", "mean", "mean_std", "impulse", "impulse_std",
     )  # fmt: skip
     columns = dict(zip(names, np.array(rows).T, strict=True))
-    yield Contact(
-        log=track.log,
-        joint=track.joint,
-        filter=threshold.filter,
-        detection_level=threshold.detection_level,
-        alarm_level=threshold.alarm_level,
-        level_from=threshold.level_from,
-        above=np.array(above, np.int64),
-        **columns,
-    )
+    yield Contact.like(threshold, log=track.log, above=np.array(above, np.int64), **columns)
 
 
 def unknown_friction(track: Track) -> Array:

@@ -33,19 +33,10 @@ def tuning(model: JointModel, before: NoiseModel, delay: float) -> Tuning:
     initial, final = (
         sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
     )
-    return Tuning(
-        log=model.log,
-        joint=model.joint,
-        rate=model.rate,
-        r_q=noise.r_q,
-        r_dq=noise.r_dq,
-        r_tau=noise.q_dq * inertia / T_s,
-        q_tau=noise.q_tau / T_s**0.5,
-        inertia=inertia,
-        viscous=model.viscous,
-        likelihood_gain=final - initial,
-        tested=len(model),
-    )
+    return Tuning.like(
+        model, r_q=noise.r_q, r_dq=noise.r_dq, r_tau=noise.q_dq * inertia / T_s, q_tau=noise.q_tau / T_s**0.5,
+        inertia=inertia, likelihood_gain=final - initial, tested=len(model),
+    )  # fmt: skip
 
 
 def initial_noise(model: JointModel, between: MeasurementNoise, lowpass: float) -> NoiseModel:

@@ -128,25 +128,18 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
     """One Choice per group of the chosen model, with all candidates and their scores."""
     chosen = selection.chosen
     for part in chosen.parts:
-        yield Choice(
+        yield Choice.like(
+            selection,
             group=part.model.group,
             model=CHOSEN,
             friction=chosen.added,
             estimator=chosen.estimator,
             chosen=chosen.name,
             best=selection.best.name,
-            why=selection.why,
             logs=tuple(log.records[0].log for log in logs),
             candidate=np.array([c.name for c in selection.candidates], object),
             variant=np.array([c.variant for c in selection.candidates], object),
             parameters=np.array([c.size for c in selection.candidates]),
-            physical=np.array(selection.physical, int),
-            score=selection.score,
-            score_std=selection.score_std,
-            training=selection.training,
-            training_std=selection.training_std,
-            over_periods=selection.over_periods,
-            over_periods_std=selection.over_periods_std,
         )
 
 
@@ -265,12 +258,10 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     modelled = Phi[:, 0] @ np.where(is_friction, theta, 0.0)
     valid &= is_evaluated(motion)
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
-    return FrictionMap(
-        log=motion.log,
-        joint=motion.joint,
+    return FrictionMap.like(
+        motion,
         model=fit.model,
         estimator=fit.estimator,
-        role=motion.role,
         dq=means.dq,
         gaining=means.gaining.astype(int),
         tau_friction=means.mean[:, 0],

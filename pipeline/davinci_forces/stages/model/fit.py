@@ -310,17 +310,12 @@ def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
 def swarm_search(model: IndependentJoint, name: str, search: Search, regression: Regression) -> SwarmSearch:
     """The record of a swarm search, with its history.  Fig 6.14"""
     residual = (regression.tau - regression.Phi @ search.theta)[regression.periods > 0]
-    return SwarmSearch(
+    return SwarmSearch.like(
+        search,
         group=model.group,
         model=model.name,
         estimator=name,
-        walls=search.walls,
-        seed=search.seed,
-        particles=search.particles,
-        searched=search.searched,
-        swarms=search.swarms,
         iterations=len(search.history),
-        excess=search.excess,
         mse=float(search.history[-1]),
         mse_std=error_of_pooled_mean(residual**2),
         best_mse=search.history,

@@ -130,7 +130,7 @@ def apply(
             continue
         path = SAME_PATH if is_fitted else identified.path(motion)
         refit = refits.get(motion.joint)
-        model = JointModel.derive(
+        model = JointModel.like(
             motion, stand_in=stand_in, path=path, scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
             unscored=unscored_flags(motion, is_scored(motion, along, joint_fit, entry)),

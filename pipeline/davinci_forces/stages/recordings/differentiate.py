@@ -15,27 +15,7 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
     """Compute position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
     orders = harmonics or joint.harmonics
     q, dq, ddq = derivatives(average, orders)
-    yield Trajectory(
-        log=average.log,
-        joint=average.joint,
-        rate=average.rate,
-        period=average.period,
-        periods=average.periods,
-        t_start=average.t_start,
-        harmonics=orders,
-        sigma_q=average.sigma_q,
-        sigma_dq=average.sigma_dq,
-        sigma_tau=average.sigma_tau,
-        sigma_tau_white=average.sigma_tau_white,
-        t=average.t,
-        q=q,
-        dq=dq,
-        ddq=ddq,
-        tau=average.tau,
-        tau_var=average.tau_var,
-        tau_alternating=average.tau_alternating,
-        count=average.count,
-    )
+    yield Trajectory.like(average, harmonics=orders, q=q, dq=dq, ddq=ddq)
     amplitude = fourier.amplitudes(average.q)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
     omitted = amplitude[orders + 1 :]

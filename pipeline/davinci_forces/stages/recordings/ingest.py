@@ -21,7 +21,7 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch |
         the study; if time does not increase; or if the clocks of channels do not go together.
     """
     intake = Intake(log, entry, robot)
-    for block in without_clock_jumps(intake, intake.blocks()):
+    for block in without_clock_jumps(intake, intake.clocks.blocks()):
         yield from intake.recordings(block)
         if intake.ended:
             break

@@ -62,22 +62,10 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     if recording.velocity == "derived":
         dq = smooth[1]
     at_rest = not moves(q, joint)
-    signal = Signal(
-        log=recording.log,
-        joint=recording.joint,
-        role=recording.role,
-        rate=1.0 / T_s,
-        method=method,
-        velocity=recording.velocity,
-        gaps=len(parts) - 1,
-        at_rest=int(at_rest),
-        t=t,
-        q=q,
-        dq=dq,
-        tau=tau,
-        segment=segment,
-        filled=filled,
-    )
+    signal = Signal.like(
+        recording, rate=1.0 / T_s, method=method, gaps=len(parts) - 1, at_rest=int(at_rest), t=t, q=q, dq=dq, tau=tau,
+        segment=segment, filled=filled,
+    )  # fmt: skip
     yield signal
     motion = without_noise(signal, smooth, lowpass)
     yield motion
@@ -116,13 +104,10 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     else:
         still = is_standing_still(q, dq, segment, rate, q_std, round(rate / lowpass))
         dq = without_doubtful_signs(dq, still, q_std, dq_std)
-    return Motion(
-        log=signal.log, joint=signal.joint, role=signal.role, rate=rate, velocity=signal.velocity,
-        cutoff=lowpass, effort_lag=0.0, at_rest=signal.at_rest, sigma_q=sigma_q,
-        sigma_dq=sigma_dq,
-        sigma_tau=noise_std(signal.tau, segment, rate, lowpass),
-        t=signal.t, q=q, dq=dq, ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, tau=signal.tau, segment=segment,
-        standing=still.astype(np.int64), filled=signal.filled,
+    sigma_tau = noise_std(signal.tau, segment, rate, lowpass)
+    return Motion.like(
+        signal, cutoff=lowpass, effort_lag=0.0, sigma_q=sigma_q, sigma_dq=sigma_dq, sigma_tau=sigma_tau, q=q, dq=dq,
+        ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, standing=still.astype(np.int64),
     )  # fmt: skip
 
 
@@ -194,7 +179,7 @@ def remarks(signal: Signal, recording: Recording, T_s: float, cuts: list[int], s
     name, notes, t = f"{recording.log}/{recording.joint}", [], recording.t
     if cuts:
         where = ", ".join(f"{t[c - 1]:.3f} s" for c in cuts[:5])
-        notes.append(f"{name}: {len(cuts)} gaps, not longest_bridge, after {where}{' ...' if len(cuts) > 5 else ''}")
+        notes.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
     if samples < len(recording):
         short = f"segments of fewer than {MIN_SAMPLES_SEGMENT}"
         notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")

@@ -138,7 +138,9 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
     blur, (x, y, z) = condition(J), evaluate_in_blocks(lambda block: tip(chain, block), q).T
     near = blur > NEAR_SINGULAR
     tested = free & ~near
-    space = levels_of(f[tested], C[tested]) if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE else UNKNOWN
+    space = UNKNOWN
+    if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE:  # within the 95 % ellipsoids
+        space = levels(np.linalg.norm(f[tested], axis=1), tip_force.reach_95(f[tested], C[tested]) / NORMAL_95)
     return TipForce(
         log=first.log, role=first.role, filter=first.filter, model=first.model, tested=int(tested.sum()),
         force_rms=space.rms, force_rms_std=space.rms_std, force_level=space.level_95,
@@ -150,11 +152,6 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
         c_xz=C[:, 0, 2], c_yz=C[:, 1, 2], condition=np.minimum(blur, np.finfo(float).max),
         near_singular=near.astype(np.int64),
     )  # fmt: skip
-
-
-def levels_of(f: Array, C: Array) -> FreeSpaceLevels:
-    """Levels of the magnitude of forces (N, 3) in free space, and the share within their 95 % ellipsoids."""
-    return levels(np.linalg.norm(f, axis=1), tip_force.reach_95(f, C) / NORMAL_95)
 
 
 def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:

@@ -179,10 +179,6 @@ class Intake:
         self.ended = True
         return {name: values[: int(after[0])] for name, values in block.items()}
 
-    def blocks(self) -> Iterator[Block]:
-        """The samples of the log, on one clock."""
-        return self.clocks.blocks()
-
     def times(self, block: Block) -> Column:
         """Time of each row [s]: by the study's time channel or rate, or the log's time channel or clock; else its
         number.

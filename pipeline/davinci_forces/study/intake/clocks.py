@@ -84,11 +84,6 @@ class UsedClocks:
         """The channel of times of all channels, or ""."""
         return self.groups[0].time if not self.are_several else ""
 
-    @property
-    def times_used(self) -> list[str]:
-        """The channels of times of all clocks."""
-        return [group.time for group in self.groups if group.time]
-
     def _is_known(self, group: ClockGroup) -> bool:
         log_time = next(iter(self.log.by_clock(group.names)))
         if group.time and not group.is_stated and self.log.find(group.time).unit == UNIT_OF_COUNTS:

@@ -15,14 +15,8 @@ MOST_JITTER = 0.1  # of the sampling time
 
 
 def summary(intake: Intake) -> LogSummary:
-    """Summarise a log that was read to its end.
-
-    Raises
-    ------
-    BadLog
-        If nothing is left to analyse.
-    """
-    clock, log, entry, nan = intake.clock, intake.log, intake.entry, float("nan")
+    """Summarise a log that was read to its end; raises BadLog if nothing is left to analyse."""
+    clock, log, entry = intake.clock, intake.log, intake.entry
     missing = intake.clocks.missing
     missing.require_most(log)
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
@@ -33,12 +27,15 @@ def summary(intake: Intake) -> LogSummary:
     feeds: dict[str, list[str]] = {}
     for quantity, channel in intake.channels.items():
         feeds.setdefault(channel.name, []).append(quantity)
-    for name in intake.clocks.times_used:
+    for name in filter(None, (group.time for group in intake.clocks.groups)):
         if "time" not in feeds.setdefault(name, []):
             feeds[name].append("time")
     names = [channel.name for channel in log.channels]
     facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
-    return LogSummary(
+    times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
+    rate, duration, jitter, longest_gap = times if intake.has_clock else (float("nan"),) * 4
+    return LogSummary.like(
+        clock,
         log=entry.name,
         role=entry.role,
         format=log.format,
@@ -46,13 +43,10 @@ def summary(intake: Intake) -> LogSummary:
         started=log.started,
         zone=log.zone,
         rows=clock.samples,
-        rate=clock.rate if intake.has_clock else nan,
-        duration=clock.last - clock.first if intake.has_clock else nan,
-        jitter=clock.jitter if intake.has_clock else nan,
-        longest_gap=clock.longest_gap if intake.has_clock else nan,
-        backward=clock.backward,
-        repeated=clock.repeated,
-        duplicates=clock.duplicates,
+        rate=rate,
+        duration=duration,
+        jitter=jitter,
+        longest_gap=longest_gap,
         dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),

@@ -31,6 +31,8 @@ from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, run_name
 from davinci_forces.report.verdicts import is_impossible
 
+PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
+
 
 def section(context: Context) -> Section | None:
     """One subsection per joint: the model that was used, then all fits beside it."""
@@ -44,17 +46,13 @@ def section(context: Context) -> Section | None:
     ]
     if links := link_parameters(context, list(joints)):
         parts.append(Section("Links", "fit-links", links))
-    return Section("Joints", "joints", (intro(), *parts))
-
-
-def intro() -> Prose:
-    """Explain the columns of the tables."""
-    return Prose(
+    intro = Prose(
         "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
         "two parts. The part from noise follows from the differences between periods. The part from the model is the "
         "change of the value if blocks of path are left out, or if the friction is modelled otherwise. $z$ is the "
         "value over its standard error, both parts together. If $abs(z) < 2$, the parameter may be zero."
     )
+    return Section("Joints", "joints", (intro, *parts))
 
 
 def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
@@ -156,15 +154,12 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     whose = "" if fit.group == joint else " of all joints"
-    return Table(
+    caption = (
         f"Parameters of the {literal(joint.replace('_', ' '))}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
-        f"Mean squared error of the effort{whose}: {mse}.{coupled}",
-        ("Symbol", "Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$"),
-        table_rows,
-        label=f"theta-{joint}",
-        align="lllrrrr",
+        f"Mean squared error of the effort{whose}: {mse}.{coupled}"
     )
+    return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
 
 
 def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str = "") -> tuple[Cell, ...]:
@@ -184,7 +179,7 @@ def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
     for fit in used.values():
         rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
         if rows:
-            header = ("", "Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
+            header = ("", *PARAMETER_HEADER)
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
             caption = (
                 f"Parameters of the links, by the model “{fit_name(fit.model, fit.estimator)}”; they act on {moved}. "
@@ -227,7 +222,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
 def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:
     """Parameters that the identification logs of a joint do not determine."""
     for record in context.catalogue.select(Identifiability, group=joint):
-        if text := "; ".join(literal(text) for text in (*record.together, *record.not_seen)):
+        if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
             yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
 
 
@@ -241,7 +236,8 @@ def correlations(context: Context, joint: str) -> Iterator[Block]:
             "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
             "difference of the two parameters is known well."
         )
-        strongest = max((abs(r) for r, a, b in pairs(record) if a != b), default=0.0)
+        pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
+        strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
         numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
         yield Figure(
             f"{title(joint)}: correlation of the errors of its parameters (least squares).",
@@ -250,8 +246,3 @@ def correlations(context: Context, joint: str) -> Iterator[Block]:
             f"correlation-{joint}",
             height=12.0 + 9.0 * len(names),
         )
-
-
-def pairs(record: Identifiability) -> Iterator[tuple[float, str, str]]:
-    """Each correlation with its two parameters."""
-    return zip(record.correlation.tolist(), map(str, record.parameter), map(str, record.beside), strict=True)

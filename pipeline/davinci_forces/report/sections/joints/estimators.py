@@ -34,7 +34,8 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     if "lse" not in residuals or len(residuals) < 2:
         return
     plain = residuals["lse"]
-    same = [name for name in MEANT_TO_DIFFER if name in residuals and effort_difference(residuals[name], plain) < ALIKE]
+    apart = {name: float(abs(r.tau_hat - plain.tau_hat).max()) for name, r in residuals.items()}
+    same = [name for name in MEANT_TO_DIFFER if name in apart and apart[name] < ALIKE * (plain.tau.std() or 1.0)]
     residuals = {name: r for name, r in residuals.items() if name not in same}
     others = {name: r for name, r in residuals.items() if name != "lse"}
     if not others:
@@ -42,10 +43,10 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     effort = label(plain, "tau", "effort")
     name = f"{title(fit.group)} in {literal(plain.log)}"
     named = ", ".join(map(estimator_name, residuals))
-    largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others.values())
+    largest, verb = max(apart[name] for name in others), "is" if len(same) == 1 else "are"
+    alike = f" {' and '.join(map(estimator_name, same))} {verb} the same as least squares." if same else ""
     yield Figure(
-        f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares."
-        f"{alike(same)}",
+        f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares.{alike}",
         f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
         (
             Panel(
@@ -64,17 +65,6 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
         columns=2,
         height=46,
     )  # fmt: skip
-
-
-def effort_difference(a: Residual, b: Residual) -> float:
-    """The largest difference of two models' efforts, in standard deviations of the effort."""
-    return float(abs(a.tau_hat - b.tau_hat).max() / (b.tau.std() or 1.0))
-
-
-def alike(names: list[str]) -> str:
-    """State the estimators that are not drawn because they agree with least squares."""
-    verb = "is" if len(names) == 1 else "are"
-    return f" {' and '.join(map(estimator_name, names))} {verb} the same as least squares." if names else ""
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
@@ -112,12 +102,9 @@ def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
     """The thesis's table of a joint, next to this study's values; none in a user's study."""
     joint = context.study.robot.joint(fit.group)
     printed = joint.printed
-    if (
-        not context.compares_with_thesis
-        or printed is None
-        or joint.effort
-        or any(len(c.theta) != len(fit.parameter) for c in printed.columns)
-    ):
+    if not context.compares_with_thesis or printed is None or joint.effort:
+        return
+    if any(len(column.theta) != len(fit.parameter) for column in printed.columns):
         return
     yield Prose(
         f"{printed.name} of the thesis, next to this study's values: first guesses, recomputed from the robot's masses "
@@ -134,35 +121,27 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
     for column in printed.columns:
         header += [f"{estimator_name(column.estimator) or 'Guess'}, printed", "here"]
     rows: list[tuple[Cell, ...]] = []
-    for i, name in enumerate((*map(str, fit.parameter), "mse")):
-        last = i == len(fit.parameter)
-        unit = f"{format_unit(fit.unit[i]) or '–'}" if not last else "–"
+    names, units = (*map(str, fit.parameter), "mse"), (*(format_unit(unit) or "–" for unit in fit.unit), "–")
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         pairs: list[Cell] = []
         for column in printed.columns:
             prefix = f"fit.{fit.group}.{fit.model}.{column.estimator}" if column.estimator else f"guess.{fit.group}"
-            value = column.mse if last else column.theta[i]
-            pairs += [
-                f"{value:g}".replace("-", "−"),
-                context.number(f"{prefix}.{slug(name)}", DIGITS, unit="", std=None),
-            ]
-        rows.append(("mean squared error" if last else name, unit, *pairs))
+            value = f"{(*column.theta, column.mse)[i]:g}".replace("-", "−")
+            pairs += [value, context.number(f"{prefix}.{slug(name)}", DIGITS, unit="", std=None)]
+        rows.append(("mean squared error" if name == "mse" else name, unit, *pairs))
     caption = f"{title(fit.group)}: {printed.name} as printed, and this study's values."
     return Table(caption, tuple(header), tuple(rows), f"printed-{fit.group}", "ll" + "r" * (len(header) - 2))
 
 
 def left_out(context: Context, joint: str) -> Iterator[Block]:
     """Every fit of a joint by its error on logs or periods left out; the chosen one also by blocks of path left out."""
-    predictions = [
-        p
-        for p in context.catalogue.select(Prediction, joint=joint, role="identification")
-        if p.model not in (CHOSEN, CHOSEN_BY_LOG)
-    ]
-    if not predictions:
+    by_fit: dict[tuple[str, str], list[Prediction]] = {}
+    for p in context.catalogue.select(Prediction, joint=joint, role="identification"):
+        if p.model not in (CHOSEN, CHOSEN_BY_LOG):
+            by_fit.setdefault((p.model, p.estimator), []).append(p)
+    if not by_fit:
         return
-    names = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
-    rows = tuple(
-        left_out_row(context, joint, [p for p in predictions if (p.model, p.estimator) == name]) for name in names
-    )
+    rows = tuple(left_out_row(context, joint, of_fit) for of_fit in by_fit.values())
     header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
     caption = f"{title(joint)}: relative error of the errors of its fits on data that were left out, in the worst log."
     table = Table(caption, header, rows, f"left-out-{joint}", "llrr")

@@ -63,17 +63,12 @@ def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str, by
     """Means of the residual in bins of position or velocity, flat at zero if no term is missing."""
     middle, mean, std = binned_means(x, errors)
     heading = f"Against {x_label.partition(' [')[0]}{' and direction' if by_direction else ''}"
-    points = Points(middle, mean, "", "blue", y_std=std)
-    lines = direction_means(x, errors) if by_direction else ()
-    return Panel(heading, x_label, label(residual, "tau", "residual"), (points, *lines))
-
-
-def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
-    """The residual's mean in each direction of motion: against sign(dq)."""
-    for i, side in enumerate((dq < 0, dq > 0)):
+    marks: list[Points | Line] = [Points(middle, mean, "", "blue", y_std=std)]
+    for i, side in enumerate((x < 0, x > 0) if by_direction else ()):
         if side.any():
-            ends, mean = np.array([0.0, dq[side][np.abs(dq[side]).argmax()]]), float(errors[side].mean())
-            yield Line(ends, np.full(2, mean), "" if i else "mean", "vermillion", "solid")
+            ends, level = np.array([0.0, x[side][np.abs(x[side]).argmax()]]), np.full(2, errors[side].mean())
+            marks.append(Line(ends, level, "" if i else "mean", "vermillion", "solid"))
+    return Panel(heading, x_label, label(residual, "tau", "residual"), tuple(marks))
 
 
 def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
@@ -109,20 +104,12 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
     text = f"Share of the residual's variance that the means in bins explain: {shares_in_words}"
     if shares[follows] > MIN_SHARE_FOLLOWED:
         return f"{text}. So the residual follows the {follows}. {ADVICE[follows] if is_plain else ALL_TRIED}"
-    within = share_within_reversals(errors, residual.dq)
-    if within > MIN_RATIO_REVERSALS:
-        larger = f"Around reversals of velocity the residual's RMS is {within:.1f} times its RMS elsewhere"
+    slow = np.abs(residual.dq) < 0.1 * float(np.sqrt(np.mean(residual.dq**2)) or 1.0)
+    near, far = (float(np.sqrt(np.mean(errors[which] ** 2))) if which.any() else 0.0 for which in (slow, ~slow))
+    if far and near / far > MIN_RATIO_REVERSALS:
+        larger = f"Around reversals of velocity the residual's RMS is {near / far:.1f} times its RMS elsewhere"
         return f"{text}. {larger}. {ADVICE['reversals'] if is_plain else ALL_TRIED}"
     return f"{text}. Neither is enough to show a missing term."
-
-
-def share_within_reversals(errors: Column, dq: Column) -> float:
-    """RMS of the residual at low velocity over its RMS at high velocity; the limit is a tenth of the RMS velocity."""
-    slow = np.abs(dq) < 0.1 * float(np.sqrt(np.mean(dq**2)) or 1.0)
-    if not slow.any() or slow.all():
-        return 1.0
-    near, far = (float(np.sqrt(np.mean(errors[which] ** 2))) for which in (slow, ~slow))
-    return near / far if far else 1.0
 
 
 def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
@@ -151,11 +138,8 @@ def explained_by(x: Column, y: Column, bins: int = 40) -> float:
     place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
     counts = np.bincount(place, minlength=bins)
     means = np.bincount(place, y, bins) / np.maximum(counts, 1)
-    unexplained, ranges, spread = (
-        float(np.sum((y - means[place]) ** 2)),
-        int((counts > 0).sum()),
-        float(y.var() * len(y)),
-    )
+    unexplained, spread = float(np.sum((y - means[place]) ** 2)), float(y.var() * len(y))
+    ranges = int((counts > 0).sum())
     if not spread or len(y) <= ranges:
         return 0.0
     return 1.0 - unexplained / spread * (len(y) - 1) / (len(y) - ranges)

@@ -56,7 +56,8 @@ def section(context: Context) -> Section:
 
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
-    yield from failures(context)
+    for task, failed in context.provenance.failures.items():
+        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{verdict_sentence(context, trusts)}**")
@@ -71,17 +72,21 @@ def blocks(context: Context) -> Iterator[Block]:
     yield Prose(opening_paragraph(context, trusts, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
+        # What is left on page one beside the table and lines of results.
+        room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (len(lines) + max(len(panels) - MAX_IN_COLUMN, 0))
         yield Figure(
             caption(contacts),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(in_column(panels)),
             label="answer-figure",
             columns=2 if len(panels) > MAX_IN_COLUMN else 1,
-            height=panel_height(len(panels), len(lines)),
+            height=room / min(len(panels), MAX_IN_COLUMN),
         )
     yield trust_table(context, trusts)
     yield Prose(rule_in_words(trusts))
-    yield from first_looks(context, trusts)
+    if looks := first_looks_in_order(context, trusts):
+        yield Prose("**Look at these first.**")
+        yield Bullets(looks)
     yield sign_off(context)
 
 
@@ -146,10 +151,9 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
     contacts = context.catalogue.select(Contact, joint=trusted.joint)
     errors = {p.log: p.model_error for p in context.catalogue.select(Prediction, joint=trusted.joint)}
-    logs = sorted(
-        (c.log for c in contacts if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0)
-    )
-    logs = logs or [c.log for c in contacts] or ([trusted.space.log] if trusted.space is not None else [])
+    touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
+    logs = sorted((log for log, joints in touched.items() if len(joints) == 1), key=lambda log: errors.get(log, 0.0))
+    logs = logs or list(touched) or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
@@ -170,32 +174,20 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
         yield replace(panel, marks=marks, x_label=panel.x_label if i >= lowest else "")
 
 
-def joints_touched(context: Context, contact: Contact) -> list[Contact]:
-    """The joints with contact windows in the same log."""
-    return [contact for contact in context.catalogue.select(Contact, log=contact.log) if contact.above.any()]
-
-
 def named_peaks(track: Track, contact: Contact) -> Points:
     """The peak in each window, with its value."""
     places = []
     for start, end in zip(contact.onset, contact.release, strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
-    return Points(
-        track.t[places], track.tau_ext_smooth[places], "", "black", names=tuple(f"{p:+.3g}" for p in contact.peak)
-    )
+    names = tuple(f"{p:+.3g}" for p in contact.peak)
+    return Points(track.t[places], track.tau_ext_smooth[places], "", "black", names=names)
 
 
 def spoken(contact: Contact) -> str:
     """The peaks of a log in words, for those who cannot see the figure."""
     unit = contact.origin.units["peak"] if contact.origin else ""
     return f"{contact.joint.replace('_', ' ')} peaks at {', '.join(f'{p:+.3g}' for p in contact.peak)} {unit}"
-
-
-def panel_height(panels: int, lines: int) -> float:
-    """The height [mm] of each of the panels that leaves room on page one for the table and for lines of results."""
-    room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (lines + max(panels - MAX_IN_COLUMN, 0))
-    return room / min(panels, MAX_IN_COLUMN)
 
 
 def trust_table(context: Context, trusts: list[Trust]) -> Table:
@@ -205,17 +197,14 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Joint", "Verdict", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought,
         "Coverage",
     )  # fmt: skip
-    return Table(
+    caption = (
         "Trust in the estimates. New path: share of the run's motion that is unlike any fitted path. Model error: RMS "
         "of measured minus modelled effort, without noise. Error/effort: model error over the RMS of the measured "
         "effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
         "free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
-        "",
-        header,
-        tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
-        label="trust-table",
-        align="ll" + "r" * (len(header) - 2),
     )
+    rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
+    return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
 
 
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
@@ -231,18 +220,9 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     key = space.prefix if space is not None else ""
     row.append(context.number(f"{key}.detection_level", 2))
     if with_sought:
-        row.append(
-            context.size(space, "detection_level", trusted.sought, 3) if space is not None and trusted.sought else "–"
-        )
+        sought = trusted.sought
+        row.append(context.size(space, "detection_level", sought, 3) if space is not None and sought else "–")
     return *row, f"{percent(space.coverage)}, {band_in_words(space.coverage)}" if space is not None else "–"
-
-
-def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
-    """The three things to look at first, worst first."""
-    looks = first_looks_in_order(context, trusts)
-    if looks:
-        yield Prose("**Look at these first.**")
-        yield Bullets(looks)
 
 
 def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
@@ -257,8 +237,9 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
     for diagnostic in context.catalogue.records(Diagnostic):
-        for text in warning_texts(diagnostic):
-            yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text)
+        for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True):
+            if severity == "warning":
+                yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text)
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
@@ -273,22 +254,17 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """Yield a caveat where the model error calls for caution."""
+    """Yield a caveat where the model error calls for caution; it names a constant part that is most of the error."""
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
     if p is not None and trusted.share > GOOD:
-        error = context.results[f"{p.prefix}.model_error"].number(2)
-        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant_part(context, p)}."
+        error, constant = context.results[f"{p.prefix}.model_error"].number(2), ""
+        if is_mostly_constant(p):
+            mean = context.results[f"{p.prefix}.mean_error"].number(2)
+            left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
+            constant = f"; {left} without its constant part, {mean}, as of another payload"
+        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
-
-
-def constant_part(context: Context, p: Prediction) -> str:
-    """Name the constant part of a model error where it is most of it, and the error without it."""
-    if not is_mostly_constant(p):
-        return ""
-    mean = context.results[f"{p.prefix}.mean_error"].number(2)
-    left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
-    return f"; {left} without its constant part, {mean}, as of another payload"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
@@ -310,15 +286,3 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
 def see(context: Context, kind: type[Record], anchor: str) -> str:
     """A reference to a section, or "" where no record of that kind exists and so the section is missing."""
     return f" See [@{anchor}]." if context.catalogue.records(kind) else ""
-
-
-def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
-    """The warnings of a diagnostic."""
-    pairs = zip(diagnostic.severity, diagnostic.text, strict=True)
-    yield from (text for severity, text in pairs if severity == "warning")
-
-
-def failures(context: Context) -> Iterator[Block]:
-    """One verdict for every task that failed."""
-    for task, failed in context.provenance.failures.items():
-        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")

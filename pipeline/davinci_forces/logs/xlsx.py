@@ -1,25 +1,34 @@
-"""Read the sheets of a workbook row by row, with openpyxl."""
+"""Excel's workbooks (.xlsx): the columns of each sheet, below a row of names, read row by row with openpyxl."""
 
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from openpyxl import load_workbook
 
 from davinci_forces.errors import BadLog
+from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import MAX_COLUMNS
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_in
 
+FIRST_MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 BLOCK_ROWS_SHEET = 1 << 12
 MAX_HEAD = 50  # rows above the first row of numbers
 MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
 
 Row = tuple[Any, ...]
+read = partial(isolated.read, reader=__name__, package="openpyxl", extra="xlsx")
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether it is a zip file of a workbook."""
+    is_named = path.suffix.lower() in (".xlsx", ".xlsm")
+    return head.startswith(b"PK") and (is_named or head[30:].startswith(FIRST_MEMBERS))
 
 
 def open_in_child(path: Path, options: Options) -> Log:
@@ -34,7 +43,7 @@ def open_in_child(path: Path, options: Options) -> Log:
         size = sum(info.file_size for info in archive.infolist())
     if size > MAX_UNPACKED:
         raise BadLog(f"{path}: unpacked it has {size >> 20} MB, more than {MAX_UNPACKED >> 20}; export it as CSV")
-    with closing(load_workbook(path, read_only=True, data_only=True)) as book:
+    with _book(path) as book:
         sheets = {sheet.title: sheet for sheet in book.worksheets}
         heads = {title: _head(sheet.iter_rows(values_only=True, max_row=MAX_HEAD)) for title, sheet in sheets.items()}
         tables = {title: head for title, head in heads.items() if head}
@@ -60,6 +69,12 @@ def open_in_child(path: Path, options: Options) -> Log:
     return log
 
 
+def _book(path: Path) -> closing[Any]:
+    from openpyxl import load_workbook
+
+    return closing(load_workbook(path, read_only=True, data_only=True))
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float | timedelta | time)
 
@@ -78,18 +93,14 @@ def _head(rows: Iterator[Row]) -> tuple[list[str], list[str], int, Row] | None:
         filled = [one for one in texts if sum(map(bool, one)) > 1] or [one for one in texts if any(one)]
         if not filled or len(row) > MAX_COLUMNS:
             return None
-        is_units = len(filled) > 1 and all(len(cell) <= 8 for cell in filled[-1]) and _widths(filled[-2], filled[-1])
+        short = len(filled) > 1 and all(len(cell) <= 8 for cell in filled[-1])
+        is_units = short and all(name for name, unit in zip(*filled[-2:], strict=False) if unit)
         names, units = (filled[-2], filled[-1]) if is_units else (filled[-1], [""] * len(row))
         last = max(i for i, value in enumerate(row) if value is not None) + 1
         width = max(last, *(i + 1 for i, name in enumerate(names) if name))
         padded = [[*cells, *[""] * width][:width] for cells in (names, units)]
         return padded[0], [unit.strip("[]()") for unit in padded[1]], number, (*row, *[None] * width)[:width]
     return None
-
-
-def _widths(names: Sequence[str], units: Sequence[str]) -> bool:
-    """Whether a row of names has a name above each of the units."""
-    return all(name for name, unit in zip(names, units, strict=False) if unit)
 
 
 @dataclass
@@ -104,7 +115,7 @@ class SheetLog(Log):
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         waiting: list[list[float]] = []
         empty: list[list[bool]] = []
-        with closing(load_workbook(self.path, read_only=True, data_only=True)) as book:
+        with _book(self.path) as book:
             for number, row in enumerate(book[self.sheet].iter_rows(values_only=True)):
                 if number < self.skipped or all(value is None for value in row):
                     continue

@@ -1,9 +1,13 @@
-"""Read the arrays of a NumPy file piece by piece, without pickle."""
+"""NumPy's files: an array (.npy), or several by name (.npz); fields of records and columns of matrices are channels.
+
+They are read piece by piece, without pickle.
+"""
 
 import math
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,21 +16,23 @@ from numpy.lib import format as npy
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
+from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 
+NPY = b"\x93NUMPY"
 MAX_MEMBERS = 1000
+read = partial(isolated.read, reader=__name__)
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether it begins as an array, or is a zip file whose first member is one."""
+    return head.startswith(NPY) or (head.startswith(b"PK") and b".npy" in head[30:542])
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the file.
-
-    Raises
-    ------
-    BadLog
-        If it holds no array of samples, or more than `MAX_MEMBERS`.
-    """
+    """Open the file; raises BadLog if it holds no array of samples, or more than `MAX_MEMBERS`."""
     log = ArrayLog(path, "npz", ())
     with open_file(path) as file:
         is_zip = file.read(2) == b"PK"
@@ -103,15 +109,11 @@ class Member:
         file, stored, begin = self.opened
         width = math.prod(self.shape[1:]) * stored.itemsize
         file.seek(begin + first * width)
-        values = np.frombuffer(_exactly(file, (last - first) * width), stored)
+        content = file.read(count := (last - first) * width)
+        if len(content) < count:
+            raise ValueError(f"an array ends after {len(content)} of {count} bytes")
+        values = np.frombuffer(content, stored)
         values = values.reshape(
             (last - first, *self.shape[1:])[: len(self.shape)], order="F" if self.by_column else "C"
         )
         return values[self.of_record] if self.of_record else values
-
-
-def _exactly(file: IO[bytes], count: int) -> bytes:
-    content = file.read(count)
-    if len(content) < count:
-        raise ValueError(f"an array ends after {len(content)} of {count} bytes")
-    return content

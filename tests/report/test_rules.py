@@ -1,0 +1,146 @@
+"""What sections compute and decide, on small records whose answer is known."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.records import FrictionMap, Pose, Residual, Stiffness, Track, Whiteness
+from davinci_forces.report.sections.innovations import over_time
+from davinci_forces.report.sections.joints.friction import curves
+from davinci_forces.report.sections.joints.friction import in_words as friction_in_words
+from davinci_forces.report.sections.joints.residuals import direction_means, in_words, share_within_reversals
+from davinci_forces.report.sections.noise import histogram
+from davinci_forces.report.sections.parts import autocorrelation, normal_plot
+from davinci_forces.report.sections.robot import walk
+from davinci_forces.report.sections.tip import signed_text
+from davinci_forces.report.sections.tissue import spread, spread_panel, surface_map
+from tests.report.report_records import record
+
+
+def test_a_line_along_the_links_goes_back_along_a_branch_and_over_no_gap():
+    """Two jaws on one head: the line visits every frame, and each step of it is a link."""
+    parent = {"0": "", "1": "0", "2": "1", "left": "2", "tip": "left", "right": "2"}
+    pose = record(Pose, 6, link=np.array([*parent], object), parent=np.array([*parent.values()], object))
+    path = [str(pose.link[i]) for i in walk(pose)]
+    assert set(path) == set(parent)
+    assert all(b in (parent[a], *(c for c in parent if parent[c] == a)) for a, b in pairwise(path))
+    assert path == ["0", "1", "2", "left", "tip", "left", "2", "right"]
+
+
+def residual(errors, dq) -> Residual:
+    return record(Residual, len(dq), model="independent", estimator="lse", dq=dq, tau=errors)
+
+
+def test_an_error_around_reversals_is_told_by_its_ratio_to_the_error_elsewhere():
+    dq = np.repeat([1.0, -1.0, 0.05, -0.05, 0.2], [40, 40, 5, 5, 10])
+    errors = np.where(np.abs(dq) < 0.1, 3.0, 1.0) * np.tile([1.0, -1.0], 50)
+    assert share_within_reversals(errors, dq) == pytest.approx(3.0)
+    assert share_within_reversals(errors, np.ones(100)) == 1.0  # without a reversal nothing is told of one
+    assert share_within_reversals(np.zeros(100), dq) == 1.0
+
+
+@pytest.mark.parametrize(("ratio", "remarked"), [(1.5, False), (2.5, True)])
+def test_reversals_are_remarked_on_where_the_error_is_more_than_twice_as_large_there(ratio, remarked):
+    dq = np.sin(2 * np.pi * np.arange(20000) / 20000)
+    slow = np.abs(dq) < 0.1 * np.sqrt(0.5)
+    errors = np.where(slow, ratio, 1.0) * np.random.default_rng(0).choice([-1.0, 1.0], len(dq))
+    said = in_words(residual(errors, dq), errors, None)
+    assert ("Around reversals" in said) == remarked
+    assert not remarked or f"{ratio:.1f} times" in said
+
+
+@pytest.mark.parametrize(("share", "follows"), [(0.05, False), (0.2, True)])
+def test_a_residual_follows_the_velocity_where_a_tenth_of_its_variance_does(share, follows):
+    rng = np.random.default_rng(1)
+    dq = rng.uniform(-1.0, 1.0, 20000)
+    errors = np.sqrt(share) * np.sign(dq) + np.sqrt(1.0 - share) * rng.standard_normal(len(dq))
+    assert ("So the residual follows the velocity" in in_words(residual(errors, dq), errors, None)) == follows
+
+
+def test_the_mean_of_each_direction_reaches_to_its_largest_velocity():
+    backwards, forwards = direction_means(np.array([-2.0, -1.0, 0.0, 1.0, 3.0]), np.array([1.0, 3.0, 9.0, -1.0, -3.0]))
+    assert_allclose([backwards.x, backwards.y], [[0.0, -2.0], [2.0, 2.0]])
+    assert_allclose([forwards.x, forwards.y], [[0.0, 3.0], [-2.0, -2.0]])
+    assert next(direction_means(np.ones(2), np.ones(2))).y[0] == 1.0
+
+
+def friction(model: str) -> FrictionMap:
+    dq = np.array([-2.0, -1.0, 1.0, 2.0] * 2)
+    columns = {"dq": dq, "tau_friction": 2.0 * np.sign(dq) + dq, "tau_friction_hat": np.sign(dq)}
+    return record(FrictionMap, 8, model=model, gaining=np.repeat([1, 0], 4), **columns)
+
+
+@pytest.mark.parametrize(("model", "lines"), [("independent", 2), ("chosen", 4)])
+def test_friction_has_a_curve_a_direction_and_one_of_each_branch_where_it_has_a_memory(model, lines):
+    drawn = [*curves(friction(model))]
+    assert len(drawn) == lines
+    assert [bool(line.label) for line in drawn] == [True] + [False] * (lines - 1)
+    assert all(np.all(np.sign(line.x) == np.sign(line.x[0])) and np.all(np.diff(line.x) >= 0) for line in drawn)
+    assert friction_in_words(friction(model)) == "-3.5 on average backwards and 3.5 forwards."
+
+
+def test_an_innovation_is_drawn_from_its_second_second_on_wherever_the_log_starts():
+    t = 100.0 + np.arange(600) / 100.0
+    [line] = over_time(record(Track, 600, t=t, innovation_q=t), "innovation_q", "position").marks
+    assert line.x[0] == pytest.approx(101.0)
+    short = record(Track, 400, t=t[:400], innovation_q=t[:400])
+    assert len(over_time(short, "innovation_q", "position").marks[0].x) == 400  # of less than 5 s all is drawn
+
+
+def test_a_histogram_holds_all_samples_beside_the_density_of_a_normal_distribution():
+    x = 2.0 + 0.5 * np.random.default_rng(0).standard_normal(5000)
+    edges, densities, grid, normal = histogram(x)
+    assert np.sum(densities * np.diff(edges)) == pytest.approx(1.0)
+    assert np.trapezoid(normal, grid) == pytest.approx(1.0, abs=2e-3)
+    assert grid[np.argmax(normal)] == pytest.approx(2.0, abs=0.05)
+    assert normal.max() == pytest.approx(1.0 / (0.5 * np.sqrt(2 * np.pi)), rel=0.05)
+    assert np.isfinite(histogram(np.ones(10))[3]).all()
+
+
+def test_a_normal_sample_lies_on_the_line_of_its_plot_whose_slope_is_the_standard_deviation():
+    from scipy.stats import norm
+
+    x = 3.0 + 2.0 * norm.ppf((np.arange(1, 2001) - 0.375) / 2000.25)
+    points, line = normal_plot("", np.random.default_rng(0).permutation(x), "").marks
+    assert (line.slope, line.intercept) == (pytest.approx(2.0, rel=2e-3), pytest.approx(3.0, abs=1e-6))
+    assert_allclose(points.y, 3.0 + 2.0 * points.x, atol=1e-9)
+
+
+@pytest.mark.parametrize(("largest", "smallest"), [(0.05, -0.05), (0.5, -0.02), (1.0, -0.9)])
+def test_a_plot_of_an_autocorrelation_shows_all_of_it_and_both_sides_of_zero(largest, smallest):
+    acf = np.array([1.0, largest, smallest])
+    w = record(Whiteness, 3, lag=np.arange(3), acf=acf, band=0.02, band_99=0.026)
+    low, high = autocorrelation(w, "").y_range
+    assert low < smallest < 0 < largest <= high
+    assert low <= -0.08 < 0.08 <= high  # four bands, so that the band is seen to be one
+    stems = autocorrelation(w, "").marks[-1]
+    assert_allclose([stems.x, stems.y], [[1, 2], [largest, smallest]])
+
+
+def test_a_component_that_is_printed_as_zero_has_no_sign():
+    assert [signed_text(x, 1) for x in (-0.04, 0.0, -0.06, 0.26)] == ["0.0", "0.0", "−0.1", "0.3"]
+
+
+def places(pushes: int = 8, **columns) -> Stiffness:
+    grid = {"x": 0.01 * np.arange(pushes), "y": np.zeros(pushes), "z": 0.002 * (np.arange(pushes) % 4)}
+    return record(Stiffness, pushes, log="run", k_t=100.0 * (1 + np.arange(pushes)), **{**grid, **columns})
+
+
+def test_a_map_of_tissue_is_drawn_over_the_two_axes_along_which_it_was_pushed():
+    assert spread(places()) == pytest.approx(0.006)
+    assert spread(places(y=np.full(8, np.nan))) == pytest.approx(0.006)  # an axis that is not known is none
+    assert spread(places(3)) == 0.0
+    [panel] = surface_map(places()).panels
+    assert (panel.x_label, panel.y_label) == ("x [mm]", "z [mm]")
+    assert [len(points.x) for points in panel.marks] == [2, 2, 2, 2]  # quarters of the pushes
+    assert_allclose(np.concatenate([points.x for points in panel.marks]), 10.0 * np.arange(8))
+    assert panel.marks[0].label == "100 to 275 N/m"
+
+
+def test_pushes_that_do_not_count_are_in_no_histogram():
+    counted = np.array([1, 1, 0, 1, 0, 1, 1, 1])
+    quartiles, bars = spread_panel(places(counted=counted, stiffness_q1=200.0, stiffness_q3=400.0)).marks
+    assert (quartiles.start, quartiles.end) == (200.0, 400.0)
+    assert bars.counts.sum() == counted.sum()

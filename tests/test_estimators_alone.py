@@ -1,0 +1,137 @@
+"""Single estimators against what defines them: their equations, solved in another way."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from davinci_forces.errors import NotIdentifiable
+from davinci_forces.estimators import huber, iv, prior, tls, wlse
+from davinci_forces.estimators.problem import Prior, Regression
+from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
+
+TWO_LOGS = (0, K // 2)
+
+
+def outliers(seed: int = 0, share: float = 0.1) -> Regression:
+    """Averaged efforts of which a share is far off."""
+    p, rng = problem(seed), np.random.default_rng(seed)
+    tau = p.tau + 3.0 * (rng.uniform(size=K) < share) * rng.choice([-1.0, 1.0], K)
+    return Regression(p.Phi, tau, p.tau_var, p.periods, (0,), NAMES)
+
+
+def test_residuals_that_count_less_beyond_a_size_balance(monkeypatch):
+    """sum psi(r / s) Phi = 0, with s the standard deviation of normal residuals of this median; it takes few steps."""
+    steps, plain = [], huber.factorise
+    monkeypatch.setattr(huber, "factorise", lambda *given: steps.append(1) or plain(*given))
+    p = outliers()
+    residual = p.tau - p.Phi @ huber.estimate(p).theta
+    s = np.median(np.abs(residual)) / 0.6745  # the upper quartile of the normal distribution
+    balance = np.clip(residual / s, -1.345, 1.345) @ p.Phi  # 1.345: 95 % efficient for normal noise
+    assert np.abs(balance / np.linalg.norm(p.Phi, axis=0)).max() < 1e-4 * np.sqrt(K)
+    assert len(steps) < huber.MAX_STEPS_HUBER  # or it would not have converged
+
+
+def test_outliers_move_a_robust_fit_by_no_more_than_its_standard_error_says():
+    off, std = [], []
+    for seed in range(60):
+        estimate = huber.estimate(outliers(seed))
+        off.append(estimate.theta - THETA)
+        std.append(estimate.standard_errors.noise)
+    assert_allclose(np.std(off, axis=0), np.mean(std, axis=0), rtol=4 / np.sqrt(2 * 60))
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0])
+def test_the_variance_of_the_model_s_error_makes_residuals_as_large_as_stated(size):
+    """sum r^2 / (1/w + s^2) = K - p."""
+    rng = np.random.default_rng(3)
+    noise = rng.uniform(0.01, 0.1, K)
+    weight = np.where(np.arange(K) % 7 == 0, 0.0, 1.0 / noise)
+    residual = np.sqrt(noise + size) * rng.standard_normal(K)
+    degrees = int(np.count_nonzero(weight)) - 4
+    new = wlse.add_model_error(weight, residual, degrees)
+    assert np.sum(residual**2 * new) == pytest.approx(degrees, rel=1e-9)
+    s2 = 1.0 / new[weight > 0] - noise[weight > 0]
+    assert_allclose(s2, s2[0], rtol=1e-6)
+    assert s2[0] == pytest.approx(size, rel=0.3)
+    assert not new[weight == 0].any()
+
+
+def test_pooled_variances_are_means_over_neighbours_that_hold_enough_degrees_of_freedom():
+    var, few = np.full(K, 0.25), np.full(K, M)
+    assert_allclose(wlse.pool_variance(var, few), 0.25)
+    few[::2] = M // 2  # a gap in half of the periods
+    var[::2] = 0.5  # and twice the variance there
+    pooled = wlse.pool_variance(var, few)
+    degrees = np.where(np.arange(K) % 2, M - 1.0, M // 2 - 1.0)
+    assert_allclose(pooled, np.sum(degrees * var) / np.sum(degrees), rtol=0.05)
+    assert_allclose(wlse.pool_variance(np.zeros(K), few), 1.0)  # periods that are alike all count the same
+    assert wlse.median_periods(np.array([0, 0, 0, 4, 6, 8])) == 6
+    assert wlse.median_periods(np.array([1, 1, 3])) == 1
+
+
+def test_a_prior_has_the_strength_that_makes_the_data_most_likely():
+    """By the density of the data itself: normal, of the noise and of parameters that scatter around the guess."""
+    p = problem(4)
+    guess = THETA * np.array([1.3, 0.8, 1.1, 0.9])
+    p = Regression(p.Phi, p.tau, p.tau_var, p.periods, (0,), NAMES, Prior(guess=guess))
+    F = p.Phi * np.abs(guess)  # in units of the guess
+    y = p.tau - p.Phi @ guess
+    size = np.linalg.norm(F * np.sqrt(M)) ** 2
+    costs, fits = [], []
+    for strength in prior.STRENGTHS[prior.STRENGTHS > 1e-12] * size:
+        C = np.eye(K) / M + F @ F.T / strength
+        quadratic = y @ np.linalg.solve(C, y)
+        costs.append(K * np.log(quadratic) + np.linalg.slogdet(C)[1])
+        change = np.linalg.solve(M * F.T @ F + strength * np.eye(len(guess)), M * F.T @ y)
+        fits.append(guess * (1 + change * np.sign(guess)))
+    assert_allclose(prior.estimate(p).theta, fits[int(np.argmin(costs))], rtol=1e-6)
+
+
+def test_instruments_are_the_regressors_before_and_after_within_each_log():
+    p = problem(5)
+    p = Regression(p.Phi, p.tau, p.tau_var, np.where(np.arange(K) % 9 == 0, 0, M), TWO_LOGS, NAMES)
+    parts = (PHI[: K // 2], PHI[K // 2 :])
+    Z = np.concatenate([np.roll(part, iv.LAG, axis=0) + np.roll(part, -iv.LAG, axis=0) for part in parts])
+    Z *= p.periods[:, None]
+    assert_allclose(iv.estimate(p).theta, np.linalg.solve(Z.T @ PHI, Z.T @ p.tau), rtol=1e-8)
+
+
+def noisy(variances, sigma=SIGMA, seed=6) -> Regression:
+    """Averaged efforts of columns with noise of these variances."""
+    rng = np.random.default_rng(seed)
+    Phi = PHI + np.sqrt(variances) * rng.standard_normal(PHI.shape)
+    tau = PHI @ THETA + sigma / np.sqrt(M) * rng.standard_normal(K)
+    cov = np.diag(variances)[None] * 1.0
+    return Regression(Phi, tau, np.full(K, 1e-12), np.full(K, M), (0,), NAMES, Phi_cov=cov)
+
+
+def test_noise_that_hides_one_column_is_reported_of_that_column_alone():
+    variances = np.zeros(len(NAMES))
+    variances[0] = 4.0 * np.mean(PHI[:, 0] ** 2)
+    with pytest.raises(NotIdentifiable, match=f"of the excitation of {NAMES[0]};"):
+        tls.estimate(noisy(variances))
+
+
+def test_total_least_squares_solve_their_equations():
+    """(Phi' Phi - K C) theta = Phi' tau, which takes what the noise of the motion adds to the squares away again."""
+    variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, 1.0, 0.0])
+    p = noisy(variances)
+    corrected = np.linalg.solve(p.Phi.T @ p.Phi - K * np.diag(variances), p.Phi.T @ p.tau)
+    theta = tls.estimate(p).theta
+    wrong = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
+    assert np.linalg.norm(theta - corrected) < 0.2 * np.linalg.norm(wrong - corrected)
+
+
+@pytest.mark.parametrize(("excess", "more"), [(0.03, False), (0.07, True)])
+def test_residuals_that_exceed_the_noise_are_the_model_s_error_unless_by_less_than_the_noise_is_known(excess, more):
+    """Of very many samples, where chance explains no excess; a variance of 200 degrees of freedom is known to 10 %."""
+    rng, many = np.random.default_rng(7), 50 * K
+    Phi, var = np.tile(PHI, (50, 1)), SIGMA**2 * np.where(np.arange(50 * K) % K < K // 2, 1.0, 4.0)
+    p = Regression(Phi, Phi @ THETA, var, np.full(many, M), (0,), NAMES)
+    root = np.sqrt(M / wlse.pool_variance(var, p.periods))
+    residual = rng.standard_normal(many)
+    A = Phi * root[:, None]
+    residual -= A @ np.linalg.lstsq(A, residual, rcond=None)[0]
+    residual *= np.sqrt((1.0 + excess) * many / np.sum(residual**2))
+    p = Regression(Phi, Phi @ THETA + residual / root, var, p.periods, (0,), NAMES)
+    assert (np.abs(wlse.estimate(p).theta / THETA - 1.0).max() > 1e-9) == more
