@@ -79,7 +79,7 @@ axe: ## install what tests judge the accessibility of a report with, where npm i
 bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s
 
-approve: $(READY_TO_TEST) ## keep the numbers and pages of the small study, after you have looked at what changed
+approve: $(READY_TO_TEST) ## keep the numbers and pages of the small studies, after you have looked at what changed
 	$(BIN)/python -m pytest -q tests/contracts/test_approved.py --approve
 
 mutants: $(READY_TO_TEST) ## change the code in COUNT places, and see whether tests notice (SEED=n for others)

@@ -1,7 +1,7 @@
 """Change the code in one place at a time, and see whether a test fails: `make mutants` (SEED=n, COUNT=n).
 
 A mutant is one operator, comparison or number of a module that is changed to another.  Up to `MAX_FILES` test files
-run, until a test fails: those that import the module and the small study, then those that import what imports it.  A
+run, until a test fails: those that import the module, the small studies, then those that import what imports it.  A
 mutant that no test notices survives: either a test is missing, or the change is of no consequence.
 """
 
@@ -32,7 +32,7 @@ OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
     ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
-SMALL_STUDY = "tests/contracts/test_approved.py"
+SMALL_STUDIES = "tests/contracts/test_approved.py"
 MAX_FILES = 12  # test files of a mutant
 TIMEOUT = 3600  # [s]; a mutant that never ends is noticed
 
@@ -94,7 +94,7 @@ def draw(seed: int, count: int) -> list[Mutant]:
 
 
 def tests_for(mutant: Mutant) -> list[str]:
-    """Return the test files for a mutant: those that import its module, the small studies, those of its importers."""
+    """Return the test files for a mutant: those that import its module, the small studies, those near to it."""
     dotted = dotted_name(ROOT / mutant.file)
     sources = {p: p.read_text() for p in (ROOT / PACKAGE).rglob("*.py")}
     importers = [p for p, text in sources.items() if imports(text, dotted)]
@@ -102,7 +102,10 @@ def tests_for(mutant: Mutant) -> list[str]:
     near.append(dotted.rpartition(".")[0])  # choices of a room are imported by name
     files = {p: p.read_text() for p in sorted((ROOT / "tests").rglob("test_*.py")) if "benchmarks" not in p.parts}
     rank = {p: 0 if imports(t, dotted) else 2 if any(imports(t, n) for n in near) else 4 for p, t in files.items()}
-    rank[ROOT / SMALL_STUDY] = 1
+    helpers = [p for p in (ROOT / "tests").rglob("*.py") if p not in files and imports(p.read_text(), dotted)]
+    names = [p.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for p in helpers]
+    rank = {p: min(rank[p], 3) if any(imports(t, name) for name in names) else rank[p] for p, t in files.items()}
+    rank[ROOT / SMALL_STUDIES] = 1
     for name in ("contracts/test_stages.py", "contracts/test_sections.py", "contracts/test_results.py"):
         rank[ROOT / "tests" / name] = min(rank[ROOT / "tests" / name], 3)
     chosen = sorted((p for p in rank if rank[p] < 4), key=lambda p: (rank[p], p))[:MAX_FILES]
@@ -136,7 +139,7 @@ class Tree:
             "PYTHONPATH": str(self.root / "pipeline"),
             "NUMBA_CACHE_DIR": str(folder / "compiled"),
         }
-        if failed := self.failing_test([SMALL_STUDY]):
+        if failed := self.failing_test([SMALL_STUDIES]):
             raise SystemExit(f"without a mutant, a test fails: {failed}")
         self.compiled = self.folder_of_compiled_code()
 
@@ -161,6 +164,12 @@ class Tree:
         )
         return Path(answer.stdout.strip())
 
+    def reuse_compiled_code(self) -> None:
+        """Let the sources as they are now find the code that was compiled for those without a mutant."""
+        folder = self.folder_of_compiled_code()
+        if folder != self.compiled:
+            shutil.copytree(self.compiled, folder, dirs_exist_ok=True)
+
     def notices(self, mutant: Mutant) -> str:
         """Return the test that fails with a mutant; "" if none does."""
         file = self.root / mutant.file
@@ -168,7 +177,7 @@ class Tree:
         try:
             replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
             if mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
-                shutil.copytree(self.compiled, self.folder_of_compiled_code(), dirs_exist_ok=True)
+                self.reuse_compiled_code()
             return self.failing_test(tests_for(mutant))
         finally:
             replace_source(file, whole)

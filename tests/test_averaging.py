@@ -149,6 +149,7 @@ def test_the_joints_of_a_log_share_one_period_and_one_at_rest_is_noted():
         dq=roll.dq * 0,
         tau=roll.tau,
         segment=roll.segment,
+        filled=roll.filled,
     )
     made, notes = run([roll, pitch, still])
     assert [a.joint for a in made] == ["hand_roll", "hand_pitch"]

@@ -31,6 +31,42 @@ if __name__ == "__main__":
     with workers.pool(1) as pool:
         print(folder(), pool.submit(folder).result())
 """
+COLD = """
+from dataclasses import replace
+from numba.core import event
+
+class Compiled(event.Listener):
+    def on_start(self, event):
+        function = event.data["dispatcher"].py_func
+        print(function.__module__ + "." + function.__qualname__.replace(" ", ""))
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Compiled())
+import numpy as np
+from davinci_forces.filters import FILTERS, tracker
+from davinci_forces.filters.innovations import coloured
+from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.haptics import loop, scenario
+from davinci_forces.maths.estimation import kernels
+from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.stages import design
+t, noise = np.arange(20) * 1e-3, NoiseModel(1e-4, 1e-3, 1e-5, 1e-3, 0.05)
+recording = FilterInput(JointDynamics(1.0 + t, (0.0,) * 7, 0.0 * t), t, t, t, t, 1e-3, 1.0)
+for name in FILTERS:
+    tracker(name)(recording, noise)
+coloured.log_likelihood(recording, coloured.Noise(noise, (0.5, 0.5)))
+haptic = replace(loop.complete_scenario(scenario.HapticScenario()), plan=((0.0, -0.01), (0.1, 0.01)))
+loop.simulate_plan(haptic, dict(haptic.hands)["firm"])
+brief = replace(ROBOT, control=tuple(replace(study, duration=0.01) for study in ROBOT.control))
+list(design.control(brief, brief.chain, brief.bodies))
+kernels.triangularise(np.ones((3, 1)), np.ones(3), np.ones(3), np.zeros((2, 2)))
+x, r = np.ones((2, 3)), np.ones((1, 2, 2, 2))
+bounds = np.zeros(2), np.ones(2), np.zeros((1, 3), int), np.ones((2, 1)), np.ones(2)
+kernels.fly(x, np.ones((2, 2)), x.copy(), np.ones(2), *bounds, r, np.ones(1), 1.0, 1.0, True, np.zeros(1))
+"""
+MAX_COMPILED = 75  # functions and specialisations, numba's too; each takes about a tenth of a second
 unix = pytest.mark.skipif(os.name == "nt", reason="Windows has no mode that says who may write")
 
 
@@ -176,6 +212,17 @@ def test_folders_unused_for_a_month_are_removed_but_for_the_last_five(home):
     left = {entry.name for entry in home.iterdir()}
     assert left == {place.name, *names[:4], "notes", f"compiled-{9:032x}"}
     assert (outside / "sub").is_dir()
+
+
+@pytest.mark.medium
+def test_a_first_run_compiles_few_functions_once_each_and_no_text(tmp_path):
+    """Array expressions bring error messages, and with them the compiler's functions for text: a second or two."""
+    compiled_functions = printed(COLD, environment(tmp_path))
+    stored = [name for name in compiled_functions if name.startswith("davinci_forces.")]
+    assert {name for name in stored if stored.count(name) > 1} <= {"davinci_forces.maths.mechanics.link.times"}
+    assert len(stored) > 30
+    assert len(compiled_functions) <= MAX_COMPILED
+    assert not [name for name in compiled_functions if "unicode" in name]
 
 
 KERNELS = [f for f in PACKAGE.rglob("*.py") if "maths.compiled import" in f.read_text(encoding="utf-8")]

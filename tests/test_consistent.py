@@ -94,7 +94,7 @@ def test_of_a_joint_without_bodies_signs_are_known():
     mechanism = independent(arm.joint("hand_roll")).mechanism
     assert_array_equal(mechanism.matrix, np.eye(4))
     assert mechanism.positive.tolist() == [True, False, True, True]
-    assert not mechanism.has_bodies
+    assert not mechanism.links
 
 
 # Where least squares can exist

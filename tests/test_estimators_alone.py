@@ -33,11 +33,11 @@ def test_residuals_that_count_less_beyond_a_size_balance(monkeypatch):
 
 def test_outliers_move_a_robust_fit_by_no_more_than_its_standard_error_says():
     off, std = [], []
-    for seed in range(60):
+    for seed in range(40):
         estimate = huber.estimate(outliers(seed))
         off.append(estimate.theta - THETA)
         std.append(estimate.standard_errors.noise)
-    assert_allclose(np.std(off, axis=0), np.mean(std, axis=0), rtol=4 / np.sqrt(2 * 60))
+    assert_allclose(np.std(off, axis=0), np.mean(std, axis=0), rtol=4 / np.sqrt(2 * 40))
 
 
 @pytest.mark.parametrize("size", [0.1, 1.0])
@@ -71,17 +71,17 @@ def test_pooled_variances_are_means_over_neighbours_that_hold_enough_degrees_of_
 
 def test_a_prior_has_the_strength_that_makes_the_data_most_likely():
     """By the density of the data itself: normal, of the noise and of parameters that scatter around the guess."""
-    p = problem(4)
+    p, some = problem(4), slice(None, None, 4)
     guess = THETA * np.array([1.3, 0.8, 1.1, 0.9])
-    p = Regression(p.Phi, p.tau, p.tau_var, p.periods, (0,), NAMES, Prior(guess=guess))
+    p = Regression(p.Phi[some], p.tau[some], p.tau_var[some], p.periods[some], (0,), NAMES, Prior(guess=guess))
     F = p.Phi * np.abs(guess)  # in units of the guess
     y = p.tau - p.Phi @ guess
     size = np.linalg.norm(F * np.sqrt(M)) ** 2
     costs, fits = [], []
     for strength in prior.STRENGTHS[prior.STRENGTHS > 1e-12] * size:
-        C = np.eye(K) / M + F @ F.T / strength
+        C = np.eye(len(y)) / M + F @ F.T / strength
         quadratic = y @ np.linalg.solve(C, y)
-        costs.append(K * np.log(quadratic) + np.linalg.slogdet(C)[1])
+        costs.append(len(y) * np.log(quadratic) + np.linalg.slogdet(C)[1])
         change = np.linalg.solve(M * F.T @ F + strength * np.eye(len(guess)), M * F.T @ y)
         fits.append(guess * (1 + change * np.sign(guess)))
     assert_allclose(prior.estimate(p).theta, fits[int(np.argmin(costs))], rtol=1e-6)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from davinci_forces.records import store
+from davinci_forces.files import PARTIAL, leftovers
 from davinci_forces.runner import reporting
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
 from davinci_forces.runner.ledger import OUTPUT, Entry, Folders, Ledger, seal
@@ -103,7 +103,7 @@ def test_a_report_is_replaced_whole_or_by_the_next_run(tmp_path, monkeypatch, se
             patch.setattr(Path, "unlink", lambda *_, **__: None)
         with suppress(Killed):
             assert not write(new)
-    there = {name: content for name, content in contents(folders.reports).items() if not name.endswith(store.PARTIAL)}
+    there = {name: content for name, content in contents(folders.reports).items() if not name.endswith(PARTIAL)}
     renamed = [*new][: max(last - len(new) - 1, 0)]
     assert there == old | {name: new[name] for name in renamed}
     assert ("manifest.txt" in renamed) <= (len(renamed) == len(new))
@@ -111,7 +111,7 @@ def test_a_report_is_replaced_whole_or_by_the_next_run(tmp_path, monkeypatch, se
     reasons = after.reasons(after.entry("report", "report"), task.fingerprint)
     seen = "was altered" if error is Killed else "it failed last time"
     assert any(seen in reason for reason in reasons) == bool(error is OSError or {*renamed} & {*old})
-    for leftover in store.leftovers(folders.reports):
+    for leftover in leftovers(folders.reports):
         leftover.unlink()
     assert write(new)
     assert contents(folders.reports) == new

@@ -27,7 +27,7 @@ from davinci_forces.stages.model import fit, predict
 from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import LogEntry
 from tests import arm
-from tests.report.report_records import free_space
+from tests.report.report_records import free_space, record
 
 RATE, LOWPASS = 100.0, 17.0
 JOINT = arm.joint("hand_roll")
@@ -207,3 +207,13 @@ def test_without_an_error_in_free_motion_there_is_no_alarm_level_and_no_error_of
     assert (threshold.alarm_level, threshold.alarm_level_std) == (0.0, 0.0)
     [threshold] = assess.gather([replace(space, free_rms=0.1, free_rms_std=0.01, free_max=0.3, crossings=1.0)])
     assert threshold.alarm_level_std / threshold.alarm_level == pytest.approx(0.1)
+
+
+def test_a_band_is_that_of_at_most_twenty_logs_from_the_first_to_the_last():
+    """The cost of each later task does not grow with the study."""
+    motions = [record(FreeMotion, 5, log=f"log-{i}", joint="hand_roll", block=np.zeros(5, int)) for i in range(43)]
+    [band] = calibrate.gather(motions)
+    logs = list(dict.fromkeys(band.source))
+    assert 10 < len(logs) <= 20
+    assert {"log-0", "log-42"} <= set(logs)
+    assert [len(set(next(iter(calibrate.gather(motions[:n]))).source)) for n in (1, 7)] == [1, 7]

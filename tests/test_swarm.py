@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.estimators import pso
 from davinci_forces.estimators.problem import Prior, Regression
 from davinci_forces.identification.regression import known_of
+from davinci_forces.maths.estimation import kernels
 from davinci_forces.maths.estimation.least_squares import solve_bounded, triangle
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
@@ -152,3 +153,16 @@ def test_a_box_is_ten_standard_errors_wide_on_either_side_and_of_data_without_no
     exact = Regression(p.Phi, p.Phi @ R.theta, p.tau_var, p.periods, (0,), p.names)
     assert np.ptp(exact.triangle.theta / R.theta) < 1e-9
     assert np.all(np.abs(pso.box_around(exact.triangle, exact).upper / R.theta - 1.0) < 1e-6)
+
+
+def test_the_inertia_of_particles_falls_in_a_straight_line_and_then_stays(monkeypatch):
+    drawn, fly = [], kernels.fly
+    monkeypatch.setattr(kernels, "fly", lambda *given: drawn.append(given[10].copy()) or fly(*given))
+    p = problem("hand_roll", known=False)
+    search(p.triangle, pso.box_around(p.triangle, p), 0, THESIS._replace(falls=40))
+    w = np.concatenate(drawn)
+    first, last = THESIS.inertia
+    assert len(w) > 80
+    assert_allclose(w[[0, 10, 20, 40]], [first, 0.75 * first + 0.25 * last, (first + last) / 2.0, last])
+    starts = np.flatnonzero(np.diff(w) > 0) + 1  # of each further swarm
+    assert_allclose(w[40 : starts[0] if len(starts) else None], last)

@@ -8,15 +8,15 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from io import BufferedReader, BytesIO, TextIOWrapper
 from pathlib import Path
 from uuid import uuid4
 
-from davinci_forces.errors import NotAFile
+from davinci_forces.errors import BadRequest, NotAFile
 
-# Size of files that a run writes.  Each log takes 70 kB of results.json and of the ledger's index: this is enough
-# for fifteen thousand logs, more than a study.toml has room for.
+# Size of files that a run writes.  Each log takes 70 kB of results.json: this is enough for fifteen thousand logs, more
+# than a study.toml has room for.
 MAX_BYTES = 1 << 30
 BLOCK_BYTES = 1 << 18  # bytes that are read at a time
 PARTIAL = ".partial"  # ends the name of a file that is still being written
@@ -151,3 +151,21 @@ def visible(text: str, keep: str = "") -> str:
         return match[0] if match[0] in keep else f"\\x{code:02x}" if code < 32 else f"\\u{code:04x}"
 
     return CONTROL.sub(escape, text)
+
+
+def leftovers(folder: Path) -> Iterator[Path]:
+    """Yield the incomplete files of an interrupted run.
+
+    Raises
+    ------
+    BadRequest
+        If a folder in it is a link, through which a run would write elsewhere.
+    """
+    for home, folders, files in os.walk(folder):  # takes a third of the time of rglob
+        for name in folders:
+            if os.path.islink(link := os.path.join(home, name)):
+                raise BadRequest(
+                    f"{link} is a link to {os.readlink(link)}, and a run writes no results through links; remove it, "
+                    "or choose other folders with --processed and --reports"
+                )
+        yield from (Path(home, file) for file in files if file.endswith(PARTIAL))

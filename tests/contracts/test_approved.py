@@ -7,7 +7,7 @@ thousandth of their standard error, so that another processor changes none.
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from itertools import starmap
 from pathlib import Path
@@ -91,6 +91,11 @@ def study(request: pytest.FixtureRequest) -> Small:
 def pages_of(about: Context) -> str:
     sections = (written(name, about) for name in SECTIONS)
     return "\n".join(line for section in sections if section for line in outline(section)) + "\n"
+
+
+@pytest.fixture(scope="module")
+def pages(study: Small) -> str:
+    return pages_of(context(study.lab, study.catalogue))
 
 
 def without_errors(study: Small) -> Context:
@@ -195,14 +200,15 @@ def test_remarks_are_those_that_were_approved(study: Small, pytestconfig: pytest
     )
 
 
-def test_pages_are_those_that_were_approved(study: Small, pytestconfig: pytest.Config):
-    pages = pages_of(context(study.lab, study.catalogue))
+def test_pages_are_those_that_were_approved(study: Small, pages: str, pytestconfig: pytest.Config):
     assert_same_lines(pages, compare(study.approved / "pages.txt", pages, pytestconfig.getoption("--approve")))
 
 
 @pytest.mark.parametrize("part", [without_errors, of_one_joint])
-def test_sentences_about_less_are_those_that_were_approved(part, study: Small, pytestconfig: pytest.Config):
-    whole = set(pages_of(context(study.lab, study.catalogue)).splitlines())
+def test_sentences_about_less_are_those_that_were_approved(
+    part: Callable[[Small], Context], study: Small, pages: str, pytestconfig: pytest.Config
+):
+    whole = set(pages.splitlines())
     sentences = (line for line in pages_of(part(study)).splitlines() if SENTENCE.match(line))
     other = "\n".join(line for line in sentences if line not in whole) + "\n"
     approved = compare(study.approved / f"{part.__name__}.txt", other, pytestconfig.getoption("--approve"))

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
-from davinci_forces.filters import FILTERS, kalman, title, tracker
-from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel
+from davinci_forces.filters import FILTERS, MAX_NIS_RATIO, diverges, kalman, title, tracker
+from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, Tracked
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
+from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm
@@ -234,6 +235,28 @@ def test_the_momentum_observers_deviation_is_that_of_its_noise():
     assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.05)
 
 
+def with_presliding(joint: JointDynamics) -> JointDynamics:
+    """A joint whose presliding friction is a part of its known effort, here of none: no filter adds it again."""
+    return joint._replace(coefficients=(*joint.coefficients[:6], 5.0))
+
+
+def test_the_momentum_observers_deviation_is_exact_for_noise_of_the_effort_alone():
+    """Of a first-order lag over white noise, over so many samples that its deviation is known to half a per cent."""
+    N = 400_000
+    noise, joint = NOISE._replace(q_dq=2e-3, r_dq=1e-9, q_tau=0.02), arm.dynamics((inertia,), THETA[:1], N)
+    effort = THETA[0] * noise.q_dq / T_S * np.random.default_rng(1).standard_normal(N)
+    made = tracker("momentum")(recording(joint, np.zeros(N), np.zeros(N), effort), noise)
+    assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.015)
+
+
+def test_the_momentum_observer_takes_the_sign_of_a_slow_velocity_as_it_is():
+    joint, theta = arm.joint("hand_roll"), arm.THETA["hand_roll"]
+    q, dq = 0.003 * T_S * np.arange(300), np.full(300, 0.003)
+    tau = regressor(joint.terms, q, dq, np.zeros(300)) @ theta
+    made = tracker("momentum")(recording(with_presliding(arm.dynamics(joint.terms, theta, 300)), q, dq, tau), NOISE)
+    assert_allclose(made.tau_ext, 0.0, atol=1e-12)
+
+
 def test_measurement_noise_that_grows_is_noticed_only_by_the_filter_that_adapts():
     """Of a velocity whose noise grows tenfold halfway, its innovations stay as large as it says."""
     N, random, joint = 8000, np.random.default_rng(0), arm.dynamics((inertia, viscous), THETA[:2], 8000)
@@ -284,3 +307,37 @@ def test_variances_stay_positive_and_numbers_finite(track: Filter, seed: int, M:
     assert (made.tau_ext_std > 0).all()
     assert [column.shape for column in made] == [(200,)] * len(made)
     assert all(np.isfinite(column).all() for column in made)
+
+
+def test_without_noise_measured_minus_model_is_what_was_exerted_however_slow_the_joint_is():
+    joint, theta = arm.joint("hand_roll"), arm.THETA["hand_roll"]
+    q, dq, ddq = arm.excitation("hand_roll", T_S * np.arange(1000))
+    tau = regressor(joint.terms, q, dq, ddq) @ theta + 0.3
+    exact = FilterInput(with_presliding(arm.dynamics(joint.terms, theta, 1000)), q, dq, ddq, tau, T_S, FIRST_STD)
+    tracked = tracker("direct")(exact, NOISE)
+    assert_allclose(tracked.tau_ext, 0.3, atol=1e-12)
+    assert_allclose(tracked.tau_ext_std, theta[0] * NOISE.q_dq / T_S)  # of an effort that errs like this acceleration
+
+
+def test_noise_that_doubles_is_followed_with_the_time_constant_of_the_window():
+    """C = 4 - 3 exp(-t / 1 s) in units of the noise before, and squared innovations 4 / C of what they should be."""
+    N, step, late = 1600, 1000, 0.5
+    joint = arm.dynamics(TERMS, THETA, N)
+    quiet = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=0.0, q_dq=1e-6, q_tau=1e-5)
+    tau, size, nis = np.full(N, THETA[-1]), np.where(np.arange(N) < step, 1.0, 2.0), []
+    at = slice(step + round(late / T_S) - 5, step + round(late / T_S) + 6)
+    for seed in range(SEEDS):
+        noise = size * np.random.default_rng(seed).standard_normal((2, N))
+        measured = recording(joint, quiet.r_q * noise[0], quiet.r_dq * noise[1], tau, initial_std=1e-3)
+        nis.append(tracker("ekf_adaptive")(measured, quiet).nis[at].mean())
+    assert np.mean(nis) / 2.0 == pytest.approx(4.0 / (4.0 - 3.0 * np.exp(-late)), rel=0.06)
+
+
+@pytest.mark.parametrize(("share", "diverging"), [(0.8, False), (1.2, True)])
+def test_a_filter_diverges_where_two_squared_innovations_are_beyond_a_multiple_of_the_two_they_should_be(
+    share, diverging
+):
+    ones = np.ones(50)
+    tracked = Tracked(ones, ones, ones, ones, ones, ones, 2.0 * MAX_NIS_RATIO * share * ones)
+    assert diverges(tracked) == diverging
+    assert diverges(tracked._replace(tau_ext=np.where(np.arange(50) == 7, np.nan, 1.0)))

@@ -317,7 +317,7 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, [], found)
-    assert f"**{sum(map(len, found))} contacts were found above the alarm level; the study states none.**" in said
+    assert f"**{sum(map(len, found))} contacts found above the alarm level; the study states none. Largest: " in said
     about = context(lab, without(catalogue, Contact))
     assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
         about, [], []

@@ -9,9 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import FilterInput
 from davinci_forces.haptics import loop as haptic
-from davinci_forces.haptics.maths.bimodal import THESIS_HAND
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, simulate_switching
 from davinci_forces.haptics.maths.delay import harmonic, zero_order_hold
-from davinci_forces.haptics.maths.motion import simulate_switching
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
 from davinci_forces.maths.models.model import JointDynamics
@@ -78,11 +77,11 @@ def test_a_sensor_in_place_of_the_filter_is_felt_at_the_next_message():
 
 
 def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():
-    runs = {name: haptic.experiment(FULL, hand) for name, hand in FULL.hands}
-    assert runs["thesis"].thrown
-    assert not runs["firm"].thrown
+    runs = {name: haptic.experiment(FULL, name, hand) for name, hand in FULL.hands}
+    assert runs["thesis"].out_of_reach
+    assert not runs["firm"].out_of_reach
     assert len(runs["firm"].t) == 3000
-    assert np.abs(runs["thesis"].x).max() <= FULL.reach
+    assert np.abs(runs["thesis"].hand_x).max() <= FULL.reach
 
 
 def test_a_device_makes_no_more_force_than_it_can():

@@ -202,7 +202,7 @@ def test_a_study_that_names_no_such_file_is_told(study, value, words):
 
 def test_a_plan_begins_and_ends_where_it_says(tmp_path):
     scenario = haptic.complete_scenario(read(written(tmp_path, SHORT)))
-    run = haptic.experiment(scenario, scenario.hands[0][1])
-    assert run.plan[0] == pytest.approx(-0.01)
-    assert run.plan[50] == pytest.approx(0.01)
-    assert np.abs(run.x - run.plan).max() < 0.004
+    run = haptic.experiment(scenario, *scenario.hands[0])
+    assert run.plan_x[0] == pytest.approx(-0.01)
+    assert run.plan_x[50] == pytest.approx(0.01)
+    assert np.abs(run.hand_x - run.plan_x).max() < 0.004

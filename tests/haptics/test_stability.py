@@ -9,9 +9,17 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
-from davinci_forces.haptics.maths import lmi, motion
-from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, energy, log_growth, mode, switching_limit
-from davinci_forces.haptics.maths.motion import simulate_switching, worst
+from davinci_forces.haptics.maths import bimodal, lmi
+from davinci_forces.haptics.maths.bimodal import (
+    Hand,
+    cqlf_limit,
+    energy,
+    log_growth,
+    mode,
+    simulate_switching,
+    switching_limit,
+    worst,
+)
 from davinci_forces.maths.estimation import conic
 
 HANDS = (Hand(1.0, 1.0, 100.0), Hand(1.0, 30.0, 100.0), Hand(0.2, 0.05, 2000.0), Hand(1.0, 20.0, 100.0))
@@ -84,8 +92,8 @@ def test_the_worst_switching_grows_beyond_its_limit_and_dies_out_below(hand):
 
 def at_the_axis(hand, k_t, run, i):
     """The speed at which a run comes back to x = 0 after sample i."""
-    t = brentq(lambda t: motion.flow(hand, k_t, (run.x[i], run.dx[i]), t)[0], 0.0, run.t[1])
-    return abs(motion.flow(hand, k_t, (run.x[i], run.dx[i]), t)[1])
+    t = brentq(lambda t: bimodal.flow(hand, k_t, (run.x[i], run.dx[i]), t)[0], 0.0, run.t[1])
+    return abs(bimodal.flow(hand, k_t, (run.x[i], run.dx[i]), t)[1])
 
 
 @pytest.mark.parametrize("share", [0.9, 0.97])
@@ -131,4 +139,4 @@ def test_a_mode_flows_as_its_matrix_says():
     for hand in (*HANDS, Hand(1.0, 20.0, 100.0)):
         for k_t in (0.0, 300.0):
             expected = expm(mode(hand, k_t) * 0.07) @ [0.3, -2.0]
-            assert_allclose(motion.flow(hand, k_t, (0.3, -2.0), 0.07), expected, rtol=1e-10)
+            assert_allclose(bimodal.flow(hand, k_t, (0.3, -2.0), 0.07), expected, rtol=1e-10)

@@ -168,6 +168,14 @@ def test_a_zipped_log_is_read_as_far_as_it_is_whole() -> None:
     assert any("the compressed file is cut" in warning for warning in log.warnings)
 
 
+def test_a_second_member_of_a_gzip_file_that_is_cut_is_told_of(tmp_path) -> None:
+    first, second = gzip.compress(b"1\n"), gzip.compress(b"2\n" * 100)
+    (tmp_path / "log.csv.gz").write_bytes(first + second[:-9])
+    lines = log_lines.Lines(tmp_path / "log.csv.gz")
+    assert b"".join(text for _, text, _ in lines.blocks(len(first))).startswith(b"1\n")  # which ends with a piece
+    assert "is cut" in lines.damage
+
+
 def test_quoted_cells_are_read_without_their_quotes() -> None:
     _, samples = text('"t, first","q"', '"0.5","1"', '"0.6","2"')
     assert list(samples) == ["t, first", "q"]

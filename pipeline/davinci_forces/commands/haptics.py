@@ -11,6 +11,7 @@ from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
     from davinci_forces.haptics.scenario import HapticScenario
+    from davinci_forces.records import HapticRun
 
 Answer = dict[str, object]
 
@@ -59,14 +60,13 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
     response, loop = haptic.response(scenario), limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:
-        run, found = haptic.experiment(scenario, hand), limits.limits_of(scenario, name, hand, loop)
+        run, found = haptic.experiment(scenario, name, hand), limits.limits_of(scenario, name, hand, loop)
         if csv is not None:
             _write_csv(csv / f"{name}.csv", run)
         numbers = {key: getattr(found, key) for key in found.scalars() if not key.startswith(("hand", "link"))}
         hands[name] = {
-            "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": float(run.true.max()),
-            "felt_peak": float(run.felt.max()), "felt_error": run.error,
-            "out_of_reach": float(run.t[-1]) if run.thrown else None,
+            "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": run.true_peak, "felt_peak": run.felt_peak,
+            "felt_error": run.felt_error, "out_of_reach": float(run.t[-1]) if run.out_of_reach else None,
             **{key: None if math.isnan(value) else value for key, value in numbers.items()},
         }  # fmt: skip
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
@@ -74,13 +74,14 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}
 
 
-def _write_csv(file: Path, run: object) -> None:
+def _write_csv(file: Path, run: "HapticRun") -> None:
     """Write the motion and force of one hand, one row per step of the controller."""
     from davinci_forces.files import write_bytes
 
-    fields = {"t [s]": "t", "plan [m]": "plan", "hand [m]": "x", "arm [m]": "q", "true [N]": "true", "felt [N]": "felt"}
-    rows = zip(*(getattr(run, name).tolist() for name in fields.values()), strict=True)
-    lines = [",".join(fields), *(",".join(f"{x:.9g}" for x in row) for row in rows)]
+    columns = run.t, run.plan_x, run.hand_x, run.arm_x, run.true_force, run.felt_force
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    names = "t [s],plan [m],hand [m],arm [m],true [N],felt [N]"
+    lines = [names, *(",".join(f"{x:.9g}" for x in row) for row in rows)]
     write_bytes(file, ("\n".join(lines) + "\n").encode())
 
 

@@ -135,13 +135,8 @@ def _chain(chain: Chain) -> dict[str, Any]:
 
 
 def _model(fit: Fit, model: Model) -> dict[str, Any]:
-    rows = zip(
-        fit.parameter,
-        fit.theta.tolist(),
-        (x if isfinite(x) else None for x in fit.theta_std.tolist()),
-        fit.unit,
-        strict=True,
-    )
+    stds = (x if isfinite(x) else None for x in fit.theta_std.tolist())
+    rows = zip(fit.parameter, fit.theta.tolist(), stds, fit.unit, strict=True)
     parameters = [
         {"name": str(name), "joint": about.joint or None, "value": value, "std": std, "unit": str(unit)}
         | (_term(about.term) if about.term else {"role": "link", "link": about.link, "inertial": about.inertial})
@@ -167,14 +162,10 @@ def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
     limits = {name: [x if isfinite(x) else None for x in ends] for name, ends in bounds.items()}
     effort = joint.joint.limits.effort
     limits["effort"] = [-effort, effort] if isfinite(effort) else [None, None]
-    about: dict[str, Any] = {
-        "name": joint.name,
-        "kind": joint.joint.kind.value,
-        "verdict": verdict,
-        "model": ".".join(joint.fit.key),
-    }
-    about |= {"units": units, "motion": motion, "limits": limits}
-    return about | {"validity": joint.validity, "filter": joint.filter}
+    return {
+        "name": joint.name, "kind": joint.joint.kind.value, "verdict": verdict, "model": ".".join(joint.fit.key),
+        "units": units, "motion": motion, "limits": limits, "validity": joint.validity, "filter": joint.filter,
+    }  # fmt: skip
 
 
 def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: Sequence[str] = ()) -> Export:

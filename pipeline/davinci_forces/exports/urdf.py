@@ -61,9 +61,8 @@ def render(export: Export) -> dict[str, str]:
         raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json and c do not")
     arm = completed_arm(robot, consistent_fit(export))
     near = "nearest to the robot's guesses" if robot.bodies else "of the least mass"
-    note = [
-        f"fit {'.'.join(arm.fit.key)}; of all bodies that have it, those {near}; {TABLE}: what a URDF does not hold"
-    ]
+    fit = ".".join(arm.fit.key)
+    note = [f"fit {fit}; of all bodies that have it, those {near}; {TABLE}: what a URDF does not hold"]
     urdf = writing.text(arm.robot, export.head(arm.fit) + note, arm.friction)
     return {"arm.urdf": urdf, TABLE: "\n".join([*export.head(), *note, *_tables(export, arm)]) + "\n"}
 

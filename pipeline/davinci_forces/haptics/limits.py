@@ -103,8 +103,8 @@ def limits_of(
         return hand_settles(replace(scenario, force_delay=scenario.force_delay + delay), hand)
 
     margin = delays.max_stable(settles_with, MAX_DELAY_MARGIN / 64.0) if hand_settles(scenario, hand) else 0.0
-    checks = {"k_t_response": by_response, "k_t_simulated": simulated, "k_t_settles": settles,
-              "k_t_best": float(k_t_delay[best])}  # fmt: skip
+    best_limit = float(k_t_delay[best])
+    checks = {"k_t_response": by_response, "k_t_simulated": simulated, "k_t_settles": settles, "k_t_best": best_limit}
     share = measured["k_t_limit_std"] / (measured["k_t_limit"] or math.nan)  # all have the arm and the filter in common
     needed = delays.damping_needed(hand, tissue, lambda damped: delays.response_limit(damped, *loop)[0])
     return HandLimit(

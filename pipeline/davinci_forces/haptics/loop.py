@@ -22,13 +22,11 @@ from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.simulation.step import Friction
 from davinci_forces.maths.simulation.surroundings import Path
+from davinci_forces.records import HapticRun
 
 NO_PATH = np.zeros((0, 2))  # no prescribed path: the hand moves freely
 PRESS_FORCE, EXTRA_SHARE = 10.0, 0.3  # [N] steady force of a hand, and share of it that is released at once
-RISE_TIME, RELEASE_TIME = (
-    1.0,
-    3.0,
-)  # [s] when the force has risen to steady force plus share, and when the share is released
+RISE_TIME, RELEASE_TIME = 1.0, 3.0  # [s] when the force has risen to steady force plus share; when it is released
 SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visible
 FREQUENCIES = np.geomspace(0.2, 30.0, 33)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
@@ -64,14 +62,9 @@ def complete_scenario(
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body
     return replace(
-        scenario,
-        body=body,
-        assumed_body=scenario.assumed_body or body,
-        noise=scenario.noise or noise,
-        stiffness=scenario.stiffness or stiffness,
-        q_tau=scenario.q_tau or q_tau,
-        filter_delay=delay,
-    )
+        scenario, body=body, assumed_body=scenario.assumed_body or body, noise=scenario.noise or noise,
+        stiffness=scenario.stiffness or stiffness, q_tau=scenario.q_tau or q_tau, filter_delay=delay,
+    )  # fmt: skip
 
 
 def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
@@ -156,12 +149,9 @@ def _axis(scenario: HapticScenario) -> Axis:
     body = scenario.body or SLIDE
     values = (body.viscous, *body.coulomb, *body.static, *body[5:])
     friction = Friction(*(np.array([float(x)]) for x in values))
-    low, high = scenario.stops
-    stops = (np.array([low]), np.array([high]))
-    return Axis(
-        np.array([[body.inertia]]), np.array([body.gravity]), friction, scenario.motor, scenario.law, stops,
-        scenario.exact,
-    )  # fmt: skip
+    low, high = (np.array([stop]) for stop in scenario.stops)
+    inertia, gravity = np.array([[body.inertia]]), np.array([body.gravity])
+    return Axis(inertia, gravity, friction, scenario.motor, scenario.law, (low, high), scenario.exact)
 
 
 def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]:
@@ -194,28 +184,18 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     return model._replace(q_tau=walk)
 
 
-class Experiment(NamedTuple):
-    """The run of one hand until the plan's end, or until it leaves the device's reach; arrays are (K,)."""
+def experiment(scenario: HapticScenario, name: str, hand: Hand) -> HapticRun:
+    """Simulate the scenario's plan, sampled at the controller's rate, until its end or until the hand leaves the reach.
 
-    t: Array  # [s]
-    plan: Array  # [m]
-    x: Array
-    q: Array
-    true: Array  # [N]
-    felt: Array
-    thrown: bool  # whether the hand left the reach of the device
-    error: float  # [N] root mean square of felt force over force scale, minus true force
-
-
-def experiment(scenario: HapticScenario, hand: Hand) -> Experiment:
-    """Simulate the scenario's plan, sampled at the controller's rate."""
+    The error is the root mean square of felt force over force scale, minus true force.
+    """
     run = simulate_plan(scenario, hand)
     outside = np.flatnonzero(np.abs(run.x) > scenario.reach)
     samples = slice(0, int(outside[0]) if len(outside) else len(run.t), round(1.0 / scenario.rate / scenario.tick))
-    t = run.t[samples] + scenario.plan[0][0]
-    plan = Path(scenario.plan, ease=True).position(t)
-    error = run.felt[samples] / (scenario.device.force or math.nan) - run.true[samples]
-    return Experiment(
-        t, plan, run.x[samples], run.q[samples], run.true[samples], run.felt[samples], bool(len(outside)),
-        float(np.sqrt(np.mean(error**2))),
+    t, true, felt = run.t[samples] + scenario.plan[0][0], run.true[samples], run.felt[samples]
+    error = felt / (scenario.device.force or math.nan) - true
+    return HapticRun(
+        hand=name, out_of_reach=int(len(outside) > 0), true_peak=float(true.max()), felt_peak=float(felt.max()),
+        felt_error=float(np.sqrt(np.mean(error**2))), t=t, plan_x=Path(scenario.plan, ease=True).position(t),
+        hand_x=run.x[samples], arm_x=run.q[samples], true_force=true, felt_force=felt,
     )  # fmt: skip

@@ -41,7 +41,7 @@ def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]
     """
     noise_std = estimate.standard_errors.noise
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
-    shares = upper * np.linalg.norm(problem.Phi, axis=0) / (np.linalg.norm(problem.tau) or 1.0)
+    shares = np.minimum(upper * np.linalg.norm(problem.Phi, axis=0) / (np.linalg.norm(problem.tau) or 1.0), 1.0)
     numbers = zip(problem.names, estimate.theta, noise_std, shares, strict=True)
     return [
         f"{name} is not significant: {theta:.2g} ± {std:.1g}, at most {percent(share)} of the effort"

@@ -77,12 +77,9 @@ class LogModels:
 
     def fields_of(self, fit: Fit, joint: str) -> dict[str, Any]:
         """Return the fields of a JointModel that follow from a fit."""
-        dynamics, record, processing = (
-            self.dynamics(fit, joint),
-            self._records[joint],
-            self.identified.cutoff_and_lag(fit, joint),
-        )
-        motion, (cutoff, effort_lag) = self.joint_motion(joint, processing), processing
+        cutoff, effort_lag = self.identified.cutoff_and_lag(fit, joint)
+        dynamics, record = self.dynamics(fit, joint), self._records[joint]
+        motion = self.joint_motion(joint, (cutoff, effort_lag))
         delay = (effort_lag - record.effort_lag) * record.rate
         q, dq = (delay_segments(x, record.segment, delay) for x in (record.q_measured, record.dq_measured))
         return {

@@ -23,7 +23,7 @@ from davinci_forces.identification.candidates import (
     share_parameters,
 )
 from davinci_forces.identification.observations import Observed, Processing
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.terms import (
@@ -225,12 +225,6 @@ def neighbours(values: Sequence[float], value: float) -> Sequence[float]:
     return values[max(i - 1, 0) : i + 2]
 
 
-def searched_logs(logs: Sequence[Observed]) -> list[Observed]:
-    """Return at most `MAX_LOGS_SEARCH` logs, evenly spread, and the first `MAX_SAMPLES_SEARCH` samples of each."""
-    numbers = np.unique(np.linspace(0, len(logs) - 1, min(len(logs), MAX_LOGS_SEARCH)).round().astype(int))
-    return [logs[number].first_samples(MAX_SAMPLES_SEARCH) for number in numbers.tolist()]
-
-
 def search_joints(
     robot: Robot, separate: dict[str, tuple[Observed, ...]], arm: tuple[Observed, ...], reaches: dict[str, Reach],
     lowpass: float,
@@ -241,17 +235,10 @@ def search_joints(
         moved = [log for log in arm if log.is_moving[log.joints.index(joint)]]
         for structure, used in (("independent", logs), ("coupled", moved)):
             if used:
-                search = JointSearch(robot, joint, structure, searched_logs(used), reaches[joint])
+                few = [used[i].first_samples(MAX_SAMPLES_SEARCH) for i in evenly(len(used), MAX_LOGS_SEARCH)]
+                search = JointSearch(robot, joint, structure, few, reaches[joint])
                 searches += [result] if (result := search.run(Processing(lowpass, 0.0))) else []
     return searches
-
-
-def best_of_joints(searches: Sequence[SearchResult]) -> list[SearchResult]:
-    """Return the search of each joint, with the structure of the lowest error."""
-    by_joint: dict[str, list[SearchResult]] = {}
-    for search in searches:
-        by_joint.setdefault(search.joint, []).append(search)
-    return [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint.values()]
 
 
 def searched_candidates(
@@ -259,7 +246,10 @@ def searched_candidates(
     arm: tuple[Observed, ...], count: int,
 ) -> list[Candidate]:  # fmt: skip
     """Return the models that were searched: the best of each joint by itself, and coupled joints that share links."""
-    best = best_of_joints(searches)
+    by_joint: dict[str, list[SearchResult]] = {}
+    for search in searches:
+        by_joint.setdefault(search.joint, []).append(search)
+    best = [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint.values()]
     if len(best) < len(separate):
         return []
     parts = [searched_part(robot, s, separate[s.joint] if s.structure == "independent" else arm, count) for s in best]

@@ -102,9 +102,10 @@ class Lines:
 
     def _unzipped(self, pieces: Iterable[bytes], size: int) -> Iterator[bytes]:
         """Unzip a gzip file up to any damage; `gzip.open` would lose the bytes before the damage."""
-        unpack = zlib.decompressobj(wbits=31)
+        unpack, has_begun = zlib.decompressobj(wbits=31), False
         for piece in pieces:
             while piece:
+                has_begun = True
                 try:
                     text = unpack.decompress(piece, size)
                 except zlib.error as error:
@@ -115,9 +116,8 @@ class Lines:
                 piece = unpack.unconsumed_tail
                 if unpack.eof:
                     piece = unpack.unused_data.lstrip(b"\0")
-                    unpack = zlib.decompressobj(wbits=31)
-                    self._ended = not piece
-        if not unpack.eof and not getattr(self, "_ended", False):
+                    unpack, has_begun = zlib.decompressobj(wbits=31), False
+        if has_begun:
             self.damage = "the compressed file is cut; the data before the cut was read"
 
     def _decoded(self, pieces: Iterable[bytes]) -> Iterator[bytes]:

@@ -6,7 +6,6 @@ its name only when it is complete.
 """
 
 import json
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from ctypes import CDLL
@@ -19,8 +18,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from davinci_forces.errors import BadRecord, BadRequest, MissingRecord, PipelineError
-from davinci_forces.files import PARTIAL, digest, require_file, temporary_name
+from davinci_forces.errors import BadRecord, MissingRecord, PipelineError
+from davinci_forces.files import digest, require_file, temporary_name
 from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from davinci_forces.records.quantities import QUANTITIES
@@ -192,24 +191,6 @@ def _return_columns() -> None:
 
 
 _return_columns()
-
-
-def leftovers(folder: Path) -> Iterator[Path]:
-    """Yield the incomplete files of an interrupted run.
-
-    Raises
-    ------
-    BadRequest
-        If a folder in it is a link, through which a run would write elsewhere.
-    """
-    for home, folders, files in os.walk(folder):  # takes a third of the time of rglob
-        for name in folders:
-            if os.path.islink(link := os.path.join(home, name)):
-                raise BadRequest(
-                    f"{link} is a link to {os.readlink(link)}, and a run writes no results through links; remove it, "
-                    "or choose other folders with --processed and --reports"
-                )
-        yield from (Path(home, file) for file in files if file.endswith(PARTIAL))
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:

@@ -207,8 +207,8 @@ def band(coverage: float) -> Level:
 
 
 def band_in_words(coverage: float) -> str:
-    """Whether a 95 % band that covers this share of free-space samples is too narrow, right or too wide."""
-    return {"bad": "too narrow", "info": "too wide", "good": "right"}[band(coverage)]
+    """Whether a 95 % band that covers this share of free-space samples is too narrow, too wide or neither."""
+    return {"bad": "too narrow", "info": "too wide", "good": "wide enough"}[band(coverage)]
 
 
 def percent(share: float) -> str:

@@ -88,22 +88,16 @@ POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)
 # The thesis does not state the friction of its simulation; these are the initial guesses of Tables 6.4-6.6.
 VISCOUS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 LIGHT = "gravity compensated with 0.9 of the masses"
-CONTROL = (
-    ControlStudy(
-        "pd-to-zero", "PD with gravity compensation, from the pose to zero",
-        POSE, ZERO, K_P, K_D, ZERO, VISCOUS, known_masses=1.0, duration=3.0,
-    ),
-    ControlStudy(
-        "pd-to-pose", "PD with gravity compensation, from zero to the pose",
-        ZERO, POSE, K_P, K_D, ZERO, VISCOUS, known_masses=1.0, duration=3.0,
-    ),
-    ControlStudy(
-        "pd-light", f"PD, {LIGHT}", ZERO, POSE, K_P, K_D, ZERO, VISCOUS, known_masses=0.9, duration=60.0,
-    ),
-    ControlStudy(
-        "pid-light", f"PID, {LIGHT}", ZERO, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0,
-    ),
-)  # fmt: skip
+EXACT = "PD with gravity compensation, from"
+CONTROL = tuple(
+    ControlStudy(name, title, start, target, K_P, K_D, integral, VISCOUS, known_masses, duration)
+    for name, title, start, target, integral, known_masses, duration in (
+        ("pd-to-zero", f"{EXACT} the pose to zero", POSE, ZERO, ZERO, 1.0, 3.0),
+        ("pd-to-pose", f"{EXACT} zero to the pose", ZERO, POSE, ZERO, 1.0, 3.0),
+        ("pd-light", f"PD, {LIGHT}", ZERO, POSE, ZERO, 0.9, 60.0),
+        ("pid-light", f"PID, {LIGHT}", ZERO, POSE, K_I, 0.9, 60.0),
+    )
+)
 
 ROBOT = Robot(
     name="davinci",

@@ -9,21 +9,22 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from davinci_forces.errors import BadLog, PipelineError
 from davinci_forces.files import digest
-from davinci_forces.logs.joined import open_joined
 from davinci_forces.logs.log import Log
-from davinci_forces.logs.parts import open_parts
 from davinci_forces.maths.arrays import BLOCK_SAMPLES
-from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic, store
+from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
 from davinci_forces.runner.places import Located, is_about_log
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration, function_of, stage_of
 from davinci_forces.study import LogEntry
+
+if TYPE_CHECKING:
+    from davinci_forces.records import store
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
         If the diagnostic of the error cannot be written, or the file `mark` is gone.  Then the run has ended, and the
         next one may have removed what this task was writing.
     """
+    from davinci_forces.records import store  # here, so that a run in which all is up to date does not load pyarrow
+
     messages: list[str] = []
     start = perf_counter()
     try:
@@ -128,6 +131,8 @@ def _record(folders: Folders, task: Task, located: Located) -> Record:
 
 
 def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
+    from davinci_forces.records import store
+
     return store.read(KINDS[kind], folder, Path(place), sha256, BLOCK_SAMPLES)
 
 
@@ -135,8 +140,10 @@ _read_cached = lru_cache(maxsize=256)(_read)
 
 
 @contextmanager
-def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
-    def unit(record: Record) -> store.Unit:
+def _writer(folders: Folders, task: Task) -> Iterator["store.Writer"]:
+    from davinci_forces.records import store
+
+    def unit(record: Record) -> "store.Unit":
         name = getattr(record, "joint", getattr(record, "group", ""))
         kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
         return lambda template: kind.unit(template, measured)
@@ -145,11 +152,14 @@ def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
         yield writer
 
 
-def _made(writer: store.Writer) -> dict[str, str]:
+def _made(writer: "store.Writer") -> dict[str, str]:
     return {f"processed/{place.as_posix()}": digest(writer.folder / place) for place in writer.places}
 
 
 def _log(folders: Folders, entry: LogEntry) -> Log:
+    from davinci_forces.logs.joined import open_joined
+    from davinci_forces.logs.parts import open_parts
+
     missing = [file for file in entry.files if not (folders.raw / file).exists()]
     if missing:
         names = ", ".join(map(repr, missing))

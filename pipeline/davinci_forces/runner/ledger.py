@@ -85,7 +85,7 @@ class Ledger:
     @cached_property
     def _entries(self) -> dict[str, dict[str, Entry]]:
         entries: dict[str, dict[str, Entry]] = {}
-        shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
+        shared: dict[str, dict[str, str]] = {}
         for place in sorted(glob("*/*.json", root_dir=self.home)):  # paths would take as long as hashing the outputs
             file = f"{self.home}{os.sep}{place}"
             try:
@@ -94,8 +94,9 @@ class Ledger:
                 self._void[file] = str(error)
                 continue
             # All tasks of a stage share its code, the largest part of an entry.
-            code = entry.fingerprint["code"]
-            entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
+            code = shared.setdefault(entry.stage, entry.fingerprint["code"])
+            if code == entry.fingerprint["code"]:
+                entry.fingerprint["code"] = code
             entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         return entries
 
@@ -207,10 +208,10 @@ def check(entry: Entry, stage: str, name: str) -> Entry:
     tables = [entry.outputs, *map(fingerprint.get, PARTS)]
     if not all(isinstance(table, dict) for table in tables):
         raise TypeError("it is not as a stage writes it")
-    hashes = (
-        value for table in (entry.outputs, fingerprint["inputs"], fingerprint["code"]) for value in table.values()
-    )
-    if not all(isinstance(text, str) for text in (entry.stage, entry.task, entry.failed, entry.environment, *hashes)):
+    texts = [entry.stage, entry.task, entry.failed, entry.environment]
+    for table in (entry.outputs, fingerprint["inputs"], fingerprint["code"]):
+        texts += table.values()
+    if {*map(type, texts)} != {str}:
         raise TypeError("it is not as a stage writes it")
     if (entry.stage, file_name(entry.task)) != (stage, name):
         raise ValueError(f"it is of another task, {entry.stage} {entry.task}")

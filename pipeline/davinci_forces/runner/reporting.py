@@ -10,7 +10,7 @@ from time import perf_counter
 
 from davinci_forces import __version__
 from davinci_forces.files import digest, read_bytes, text_of, write_together
-from davinci_forces.records import KINDS, Record, store
+from davinci_forces.records import KINDS, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, error_message, without_folders
@@ -81,6 +81,7 @@ def ratings(study: Study) -> tuple[Rating, ...]:
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
     """A catalogue of the records at these places, each read when it is used."""
+    from davinci_forces.records import store
 
     def read(kind: type[Record]) -> list[Record]:
         places = [place for name, place in located if name == kind.__name__]

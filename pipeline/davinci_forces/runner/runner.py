@@ -8,7 +8,8 @@ from functools import cached_property, partial
 from itertools import groupby
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.records import KINDS, store
+from davinci_forces.files import leftovers
+from davinci_forces.records import KINDS
 from davinci_forces.report import REPORT
 from davinci_forces.runner import reporting
 from davinci_forces.runner.console import Console
@@ -116,7 +117,7 @@ class Runner:
 
     def _remove_leftovers(self) -> None:
         """Remove half-written files of an interrupted run or a killed process."""
-        for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
+        for leftover in [*leftovers(self.folders.processed), *leftovers(self.folders.reports)]:
             leftover.unlink(missing_ok=True)
 
     def _remove_obsolete(self, steps: Sequence[str]) -> None:

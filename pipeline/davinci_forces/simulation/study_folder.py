@@ -40,12 +40,12 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
         new, old = Path(temporary) / "new", Path(temporary) / "old"
         new.mkdir()
         truths = [_log(scenario, log, new, say) for log in scenario.logs]
-        _text(new / TRUTH, truth_text(scenario, truths))
+        (new / TRUTH).write_text(truth_text(scenario, truths), encoding="utf-8", newline="\n")
         if beside:
             for name in (*(log.file for log in scenario.logs), TRUTH):
                 (new / name).replace(folder / name)
         else:
-            _text(new / STUDY, text)
+            (new / STUDY).write_text(text, encoding="utf-8", newline="\n")
             if folder.exists():
                 folder.rename(old)
             shutil.move(new, folder)
@@ -97,10 +97,6 @@ def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) ->
     if log.sensor and run.force is not None:
         channels += record_force(log.sensor, run.t, run.force, generator(scenario.seed, log.name, "force"))
     return channels
-
-
-def _text(file: Path, text: str) -> None:
-    file.write_text(text, encoding="utf-8", newline="\n")
 
 
 def study_text(scenario: Scenario) -> str:

@@ -29,7 +29,6 @@ ROUNDING = 1e-9  # of a number that lies half a printed digit away
 STANDARD_ERRORS = 2.0  # of a fitted parameter, within which it agrees
 ESTIMATORS = ("wlse", "lse", "pso")
 ROLL, PITCH, SLIDE = davinci.ROBOT.joints
-LINKS = davinci_chain.CHAIN.links
 
 
 class ThesisItem(NamedTuple):
@@ -140,26 +139,12 @@ def links() -> dict[str, Array]:
     return dict(zip(names, (a, d, alpha / (pi / 2), theta), strict=True))
 
 
-def centres() -> dict[str, Array]:
-    """The distances of Table 4.1; the printed signs are part of Eq 4.17."""
-    bodies = davinci_chain.in_table_frames()
-    return {"l_c2 to l_c9 [m]": np.abs(bodies.centres).max(axis=1)[: len(LINKS) - 1][:8]}
-
-
-def cylinders() -> dict[str, Array]:
-    """Mass, height and radius of Table 4.2, one jaw."""
+def bodies() -> dict[str, Array]:
+    """The distances of Table 4.1, whose printed signs are part of Eq 4.17, and Table 4.2, with one jaw."""
+    centres = np.abs(davinci_chain.in_table_frames().centres).max(axis=1)[:8]
     mass, height, radius = np.array([body[:3] for body in davinci_chain.CYLINDERS[:8]]).T
-    return {"mass of links 2 to 9 [kg]": mass, "height [m]": height, "radius [m]": radius}
-
-
-def gains() -> dict[str, Array]:
-    """The gains of Tables 5.1 and 5.4."""
-    return {"K_p": np.array(davinci.K_P), "K_i": np.array(davinci.K_I), "K_d": np.array(davinci.K_D)}
-
-
-def pose() -> dict[str, Array]:
-    """The pose of Tables 5.2 and 5.3."""
-    return {"q at the start": np.array(davinci.POSE), "reference": np.array(davinci.POSE)}
+    sizes = {"mass of links 2 to 9 [kg]": mass, "height [m]": height, "radius [m]": radius}
+    return {"l_c2 to l_c9 [m]": centres, **sizes}
 
 
 def factors(joint: Joint, term: Term, monomials: str) -> Array:
@@ -222,11 +207,6 @@ def motors() -> dict[str, Array]:
     return {"gear ratio of motors 1 to 7": davinci_chain.DRIVES.gear_ratio, "K_m [N m/A] of motors 1 to 3": constants}
 
 
-def swarm() -> dict[str, Array]:
-    """The size of a swarm, and when it ends."""
-    return {"particles, iterations, iterations without change": np.array([PARTICLES, MAX_ITERATIONS, PATIENCE])}
-
-
 def counts() -> dict[str, Array]:
     """Numbers of physical parameters, and of parameters of the models."""
     joints = davinci.ROBOT.joints
@@ -253,15 +233,6 @@ def parameters(joint: Joint) -> dict[str, Array]:
     return {"guess": guess, "MSE of guess, wlse, lse, pso": mse}
 
 
-def weight() -> dict[str, Array]:
-    """The hanging mass of section 7.5, and the scale from the printed force."""
-    newton = 0.097 * GRAVITY
-    return {
-        "mass [kg] and weight [N]": np.array([0.097, newton]),
-        "force [N] and scale of the thesis's recording": np.array([np.nan, 4.7945 / newton]),
-    }
-
-
 def hand() -> dict[str, Array]:
     """The hand of Fig 8.9."""
     from davinci_forces.haptics.maths.bimodal import THESIS_HAND
@@ -280,24 +251,33 @@ def measurement_noise() -> dict[str, Array]:
     return {"deviation of position [rad] and velocity [rad/s]": np.array([noise.q, noise.dq])}
 
 
+# Numbers that need no computation: gains, poses, the size of a swarm and when it ends, and the hanging mass with the
+# scale from the printed force.
+GAINS = {"K_p": np.array(davinci.K_P), "K_i": np.array(davinci.K_I), "K_d": np.array(davinci.K_D)}
+POSES = {"q at the start": np.array(davinci.POSE), "reference": np.array(davinci.POSE)}
+SWARM = {"particles, iterations, iterations without change": np.array([PARTICLES, MAX_ITERATIONS, PATIENCE])}
+WEIGHT = {
+    "mass [kg] and weight [N]": np.array([0.097, 0.097 * GRAVITY]),
+    "force [N] and scale of the thesis's recording": np.array([np.nan, 4.7945 / (0.097 * GRAVITY)]),
+}
 TABLES = {"Eq 6.57-6.58, Table 6.4": ROLL, "Eq 6.59-6.60, Table 6.5": PITCH, "Eq 6.61, Table 6.6": SLIDE}
 FOUND: dict[str, Callable[[], dict[str, Array]]] = {
     "Table 3.1": links,
-    "Table 4.1": centres,
-    "Table 4.2": cylinders,
-    "Table 5.1": gains,
-    "Table 5.2": pose,
-    "Table 5.3": pose,
-    "Table 5.4": gains,
+    "Table 4.1": bodies,
+    "Table 4.2": bodies,
+    "Table 5.1": lambda: GAINS,
+    "Table 5.2": lambda: POSES,
+    "Table 5.3": lambda: POSES,
+    "Table 5.4": lambda: GAINS,
     "Eq 6.7-6.9": roll_factors,
     "Eq 6.10-6.12": pitch_factors,
     "Table 6.1": excitation,
     "Table 6.2": limits,
     "Eq 6.28-6.29, Table 6.3": motors,
-    "Section 6.5.1": swarm,
+    "Section 6.5.1": lambda: SWARM,
     "Section 6.6": counts,
     "Table 7.1": measurement_noise,
-    "Eq 7.29-7.30, Fig 7.12": weight,
+    "Eq 7.29-7.30, Fig 7.12": lambda: WEIGHT,
     "Eq 8.8-8.10, Fig 8.9": hand,
     **{item: (lambda joint=joint: parameters(joint)) for item, joint in TABLES.items()},  # type: ignore[misc]
 }

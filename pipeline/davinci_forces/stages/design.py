@@ -145,6 +145,7 @@ def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
     q, dq, ddq = fourier.motion(series, t)
     ranges = zip(fourier.ranges(series), limits_of(joint), strict=True)
     excess = [float(max(low - least, largest - high, 0.0)) for (least, largest), (low, high) in ranges]
+    excesses = dict(zip(("excess_q", "excess_dq", "excess_ddq"), excess, strict=True))
     return Excitation(
         joint=joint.name,
         source=source,
@@ -152,9 +153,7 @@ def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
         objective=float(fourier.determinant(F)),
         condition=float(10 ** fourier.condition(F)),
         coefficients=tuple(series.x.tolist()),
-        excess_q=excess[0],
-        excess_dq=excess[1],
-        excess_ddq=excess[2],
+        **excesses,
         t=t,
         q=q,
         dq=dq,

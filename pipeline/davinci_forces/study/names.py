@@ -107,9 +107,8 @@ def _words(key: str) -> list[str]:
 def _labels(channel: Channel) -> Iterator[tuple[str, str]]:
     """Ways to read a joint from a name, the likelier first: what is left of the name, and the label of the joint."""
     name = channel.name
-    spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + [m.span() for m in re.finditer(r"\d+", name)][
-        ::-1
-    ]
+    digits = [m.span() for m in re.finditer(r"\d+", name)]
+    spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + digits[::-1]
     parts = re.split(r"([/.])", name)
     ends = [sum(map(len, parts[: k + 1])) for k in range(len(parts))]
     spans += [

@@ -50,8 +50,14 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     title, robot, simulated = table.text("title", name), _robot(table, folder), table.flag("simulated", False)
     overrides = table.table("robot_overrides")
     robot = _overridden(robot, overrides) if robot else None
-    robot = _with_tool(robot, table) if "tool" in table else robot
-    robot = _with_base(robot, table) if "base" in table else robot
+    for name, placed in (("tool", _with_tool), ("base", _with_base)):
+        if name in table:
+            stated = table.table(name)
+            try:
+                robot = placed(robot, stated)
+            except BadRobot as error:
+                table.problem(str(error), name)
+            stated.close()
     remarks = _remarks(table.table("settings"))
     settings = settings_of(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
@@ -143,30 +149,18 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
     return replace(robot, joints=tuple(joints.values()))
 
 
-def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
+def _with_tool(robot: Robot | None, tool: TomlTable) -> Robot | None:
     """The robot with the tool length that the study gives."""
-    tool = table.table("tool")
     length = check_positive(tool, "length", tool.number("length", expected="a number of metres", kind="tool"))
-    tool.close()
-    try:
-        return robot.with_tool(length) if robot and math.isfinite(length) else robot
-    except BadRobot as error:
-        table.problem(str(error), "tool")
-        return robot
+    return robot.with_tool(length) if robot and math.isfinite(length) else robot
 
 
-def _with_base(robot: Robot | None, table: TomlTable) -> Robot | None:
+def _with_base(robot: Robot | None, base: TomlTable) -> Robot | None:
     """The robot on the base that the study states; overridden terms are those of the base, too."""
-    base = table.table("base")
     rpy = base.numbers("rpy", count=3, expected="roll, pitch and yaw [rad], such as [1.5708, 0.0, 0.0]")
     if rpy and max(map(abs, rpy)) > 2 * math.pi:
         base.problem(f"rpy is in rad, so that {excerpt(list(rpy))} is more than a turn; write degrees as rad", "rpy")
-    base.close()
-    try:
-        return robot.with_base((rpy[0], rpy[1], rpy[2])) if robot and rpy else robot
-    except BadRobot as error:
-        table.problem(str(error), "base")
-        return robot
+    return robot.with_base((rpy[0], rpy[1], rpy[2])) if robot and rpy else robot
 
 
 def _remarks(settings: TomlTable) -> tuple[str, ...]:

@@ -228,16 +228,13 @@ class _Writer:
         """The lines of the [[log]]; all of them comments if nothing in the log can be used."""
         paths = [_text(path) for path in _path(self.draft.files, self.folder)]
         join = f"join = [{', '.join(paths)}]  # one signal per file"
+        period = "# period = 10.0  # [s] estimated from the data; a given value is checked"
         block = [
             "[[log]]",
             f"name = {_text(self.name)}",
             f"file = {paths[0]}" if len(paths) == 1 else join,
             *self._role(),
-            *(
-                []
-                if self.draft.touching
-                else ["# period = 10.0  # [s] estimated from the data; a given value is checked"]
-            ),
+            *([] if self.draft.touching else [period]),
             *self._rate(),
             "# skip = 1.0  # [s] start-up transient to leave out",
             "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out",

@@ -89,9 +89,7 @@ def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> Ve
     alike = [VelocityRatio(*pair) for pair in both if pair[0] >= MIN_CORRELATION]
     if not alike:
         return None
-    return VelocityRatio(
-        *(float(np.median([getattr(slope, name) for slope in alike])) for name in VelocityRatio._fields)
-    )
+    return VelocityRatio(*np.median(alike, axis=0).tolist())
 
 
 def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> TimeGuess:

@@ -20,9 +20,17 @@ and damping ratio zeta, a mode that starts at speed v reaches the displacement X
 Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)).  At the limit of K_T
 this factor is 1.  Below the limit the motion decays under every switching law; above it the motion grows under the
 worst law.  This is exact for planar systems.
+
+The flow of a mode with stiffness k over a time t is, with sigma = b / 2m and w^2 = sigma^2 - k/m,
+
+    exp(A t) = exp(-sigma t) (cosh(w t) I + sinh(w t)/w (A + sigma I)),
+
+with cos and sin for w^2 < 0.  If a law switches within a step, bisection finds the instant.
 """
 
+import cmath
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +40,10 @@ from davinci_forces.maths.arrays import Array
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 SERIES_RANGE = 1e-6  # distance of a damping ratio from 1 within which the series is used
 MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS = 1.0, 1e5  # [N/m] range of K_H
+State = tuple[float, float]  # x [m], dx [m/s]
+Law = Callable[[float, float], float]  # function of x and dx: the tissue acts if its value is positive
+SWITCH_HALVINGS = 50
+SAMPLES_PER_PERIOD = 100  # periods of the faster mode
 
 
 class Hand(NamedTuple):
@@ -103,3 +115,61 @@ def log_loss_away(zeta: float) -> float:
 def log_loss_back(zeta: float) -> float:
     """h: the logarithmic loss of speed on the way back to the axis; zeta < 1, or the axis is never reached."""
     return zeta / math.sqrt(1.0 - zeta**2) * (math.pi - math.acos(zeta))
+
+
+class Swing(NamedTuple):
+    """Position and velocity (N,) of the hand over time."""
+
+    t: Array  # [s]
+    x: Array  # [m]
+    dx: Array  # [m/s]
+
+
+def at_contact(x: float, dx: float) -> float:
+    """The real switching law: the tissue acts on one side of its surface.  (8.7)"""
+    return x
+
+
+def worst(x: float, dx: float) -> float:
+    """The worst switching law: on either side, the tissue acts only while the hand returns."""
+    return -x * dx
+
+
+def simulate_switching(hand: Hand, k_t: float, start: State, duration: float, law: Law = at_contact) -> Swing:
+    """Simulate the hand released at `start`, with tissue of k_t [N/m] switched by a law, for a duration [s]."""
+    step = 2.0 * math.pi / math.sqrt((hand.k + k_t) / hand.m) / SAMPLES_PER_PERIOD
+    t = step * np.arange(math.ceil(duration / step) + 1, dtype=float)
+    states = [start]
+    for _ in t[1:]:
+        states.append(step_switched(hand, k_t, states[-1], step, law))
+    x, dx = np.array(states).T
+    return Swing(t, x, dx)
+
+
+def step_switched(hand: Hand, k_t: float, state: State, step: float, law: Law) -> State:
+    """The state after a step in which the law may switch."""
+    remaining = step
+    while remaining > 0.0:
+        ahead = flow(hand, 0.0, state, 1e-9 * step)  # on a switching line, the state just after it selects the mode
+        stiffness = k_t if law(*ahead) > 0.0 else 0.0
+        after = flow(hand, stiffness, state, remaining)
+        if (law(*after) > 0.0) == (stiffness > 0.0):
+            return after
+        low, high = 0.0, remaining
+        for _ in range(SWITCH_HALVINGS):
+            middle = 0.5 * (low + high)
+            on = (law(*flow(hand, stiffness, state, middle)) > 0.0) == (stiffness > 0.0)
+            low, high = (middle, high) if on else (low, middle)
+        state, remaining = flow(hand, stiffness, state, high), remaining - high
+    return state
+
+
+def flow(hand: Hand, k_t: float, state: State, t: float) -> State:
+    """The state of one mode after a time t [s]."""
+    x, dx = state
+    sigma, square = 0.5 * hand.b / hand.m, (hand.k + k_t) / hand.m
+    w = cmath.sqrt(sigma**2 - square)
+    even = cmath.cosh(w * t).real
+    odd = (cmath.sinh(w * t) / w).real if w else t
+    shrink = math.exp(-sigma * t)
+    return shrink * (even * x + odd * (sigma * x + dx)), shrink * (even * dx + odd * (-square * x - sigma * dx))

@@ -18,6 +18,7 @@ from davinci_forces.maths.arrays import Array
 Answer = tuple[Message, list[Array]]
 FINAL_FIELDS = ("facts", "warnings", "comments", "dropped", "cut")
 FIELDS = ("format", "channels", "clock", "time", "started", "zone", *FINAL_FIELDS)
+_opened: dict[Any, Log] = {}  # the log that was opened last, by all that it depends on
 
 
 def serve() -> None:
@@ -25,61 +26,44 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints must not mix with the answers
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
-    child = Child()
     with suppress(EOFError, BrokenPipeError):
         while True:
-            _answer(child, pickle.load(sys.stdin.buffer)[0], answers)
+            _answer(pickle.load(sys.stdin.buffer)[0], answers)
 
 
-def _answer(child: "Child", request: Message, answers: IO[bytes]) -> None:
+def _answer(request: Message, answers: IO[bytes]) -> None:
     """Answer one request; errors in a library are answers, too."""
     _limit(request["memory"], request["cpu"])
     try:
-        for message, columns in child.answers(request):
+        for message, columns in _answers(request):
             send(answers, message, columns)
     except BrokenPipeError:
         raise
     except BadLog as error:
         send(answers, {"bad": str(error)})
     except MemoryError:
-        child.forget()
+        _opened.clear()
         send(answers, {"bad": "", "memory": True})
     except Exception as error:
-        child.forget()
+        _opened.clear()
         send(answers, {"bad": f"{type(error).__name__}: {error}", "fault": True})
 
 
-class Child:
-    """State between two requests: the log that was opened last."""
-
-    def __init__(self) -> None:
-        self.key: Any = None
-        self.log: Log | None = None
-
-    def forget(self) -> None:
-        """Release the log."""
-        self.key = self.log = None
-
-    def answers(self, request: Message) -> Iterator[Answer]:
-        """Yield the description of an opened log, or its blocks."""
-        log = self._opened(request)
-        names = request["names"]
-        if names is None:
-            yield {name: getattr(log, name) for name in FIELDS}, []
-            return
-        for block in log.blocks(names):
-            yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
-        yield {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}, []
-
-    def _opened(self, request: Message) -> Log:
-        path = Path(request["path"])
-        about = path.stat()
-        key = (request["reader"], path, request["options"], about.st_mtime_ns, about.st_size)
-        if self.log is None or self.key != key:
-            self.forget()
-            self.log = import_module(request["reader"]).open_in_child(path, request["options"])
-            self.key = key
-        return self.log
+def _answers(request: Message) -> Iterator[Answer]:
+    """Yield the description of an opened log, or its blocks."""
+    path = Path(request["path"])
+    about = path.stat()
+    key = (request["reader"], path, request["options"], about.st_mtime_ns, about.st_size)
+    if key not in _opened:
+        _opened.clear()
+        _opened[key] = import_module(request["reader"]).open_in_child(path, request["options"])
+    log, names = _opened[key], request["names"]
+    if names is None:
+        yield {name: getattr(log, name) for name in FIELDS}, []
+        return
+    for block in log.blocks(names):
+        yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
+    yield {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}, []
 
 
 def _limit(memory: int, seconds: float) -> None:

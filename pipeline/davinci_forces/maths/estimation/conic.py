@@ -73,7 +73,7 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
     NotIdentifiable
         If the solver does not converge.
     """
-    if not mechanism.has_bodies and (R.theta[mechanism.positive] >= 0).all():
+    if not mechanism.links and (R.theta[mechanism.positive] >= 0).all():
         return ConsistentParameters(R.theta, R.theta, 0.0, 0.0)
     F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.min_squares))
     cones = scale_unknowns(F, mechanism)

@@ -33,11 +33,6 @@ class Mechanism(NamedTuple):
     links: int  # L; the first 10 L of x are inertial parameters, in the order of `bodies.PARAMETERS`
     positive: Booleans  # (n,) numbers of x, other than inertial parameters, that are not negative
 
-    @property
-    def has_bodies(self) -> bool:
-        """Whether links constrain the parameters, in addition to signs."""
-        return self.links > 0
-
 
 def of_signs(positive: Booleans) -> Mechanism:
     """A mechanism without links, theta = x; the parameters `positive` (p,) are not negative."""

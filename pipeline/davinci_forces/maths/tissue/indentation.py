@@ -111,11 +111,6 @@ class Indentation(NamedTuple):
     onset_std: float
     release: float  # depth of last contact [m]
 
-    @property
-    def has_contact(self) -> bool:
-        """Whether there is any contact."""
-        return self.state != NONE
-
 
 def all_of(depth: Array, counted: Booleans, state: str = ALL_CONTACT) -> Indentation:
     """A push at depths (N,) with contact at all counted samples; or a push in another state, without an onset."""

@@ -223,7 +223,7 @@ def _pushed(
     if rate and len(depth) > 1:
         d_rate = np.gradient(lowpass(depth, rate, cutoff), probing.t[part])
     inside, loading = contact.inside, contact.loading
-    line = indentation.straight(depth[inside], force[inside]) if contact.has_contact else None
+    line = indentation.straight(depth[inside], force[inside]) if contact.state != NONE else None
     common = float(np.sqrt(np.mean(probing.std[part][inside] ** 2))) if line else 0.0
     error = indentation.slope_error(depth[inside], common) if line else 0.0
     if line and line.k:  # an error of the force, over the stiffness, moves the onset

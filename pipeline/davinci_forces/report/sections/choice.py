@@ -131,16 +131,12 @@ def unseen(context: Context) -> Iterator[Block]:
     predictions = [p for p in context.catalogue.select(Prediction, model=CHOSEN) if p.role != "identification"]
     if not predictions:
         return
-    rows = tuple(
-        (
-            *run_cells(p),
-            "fitted" if p.path == SAME_PATH else "new",
-            context.number(f"{p.prefix}.relative_error", 3),
-            context.number(f"predict.{p.log}.{p.joint}.independent.lse.relative_error", 3),
-        )
-        for p in predictions
-    )
+    rows = []
+    for p in predictions:
+        keys = p.prefix, f"predict.{p.log}.{p.joint}.independent.lse"
+        errors = (context.number(f"{key}.relative_error", 3) for key in keys)
+        rows.append((*run_cells(p), "fitted" if p.path == SAME_PATH else "new", *errors))
     header = ("Log", "Joint", "Path", "Chosen", "Plain model")
     caption = "Relative error on logs that were not fitted. Plain model: each joint alone, by least squares."
-    table = Table(caption, header, rows, "choice-unseen", "lllrr")
+    table = Table(caption, header, tuple(rows), "choice-unseen", "lllrr")
     yield from paper_or_screen(table, "The chosen and the plain model, run by run", MAX_RUNS_ON_PAPER)

@@ -47,24 +47,28 @@ def blocks(context: Context) -> Iterator[Block]:
             "includes the smoother's standard deviation there, and the height by which smoothing flattens the peak. "
             "The standard error of a mean also includes the effort that smoothing moves out of the window. Peaks are "
             "judged by the detection level, which is lower: 99 % of the samples of the joint's worst run in free space "
-            "stay below it."
+            f"stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)
-        yield Table(
+        caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "Interval: 95 % confidence interval of the peak. Verdict: whether the peak exceeds the detection level; "
             "“peak only” if it does but stays below the alarm level; “found” for a contact outside the windows that "
-            "the study states.",
-            ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict"),
-            tuple(row for contact in contacts for row in rows(context, contact)),
-            "contact-table",
-            "llrrrrrrl",
-            largest(contacts),
+            "the study states."
         )
+        header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
+        every = tuple(row for contact in contacts for row in rows(context, contact))
+        yield Table(caption, header, every, "contact-table", "llrrrrrrl", largest(contacts))
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
-        header = ("Log", "Joint", "Reason, and remedy")
-        yield Table("Joints of logs on which no contact was measured.", header, unused, "not-analysed")
+        columns = ("Log", "Joint", "Reason, and remedy")
+        yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
+
+
+def alarm_levels(context: Context, contacts: list[Contact]) -> str:
+    """The alarm level of each joint, in words."""
+    joints = dict.fromkeys(contact.joint for contact in contacts)
+    return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
 
 
 def largest(contacts: list[Contact]) -> tuple[int, ...]:

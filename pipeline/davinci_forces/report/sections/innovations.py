@@ -19,7 +19,7 @@ from davinci_forces.report.content import (
     Table,
     literal,
 )
-from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
 
 UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the correlation
@@ -56,25 +56,20 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     figures = [figure(context, e, whole=True) for e in drawn]
     yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
-    others = tuple(
-        OnScreen(
-            run_name(e.log, e.joint),
-            f"why-{e.log}-{e.joint}",
-            (trials(e),) if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False), trials(e)),
-        )
-        for e in explained
+    others = []
+    for e in explained:
+        seen = () if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False),)
+        others.append(OnScreen(run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (*seen, trials(e))))
+    yield OnScreen(
+        f"Innovations of {count(len(others), 'run')}, and the tested causes", "innovation-runs", tuple(others)
     )
-    yield OnScreen(f"Innovations of {count(len(others), 'run')}, and the tested causes", "innovation-runs", others)
 
 
 def summary(explained: list[Explanation]) -> str:
     """State how many runs are white, and how many are explained."""
     counts = Counter(e.finding for e in explained)
-    findings = [
-        f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
-        for finding, words in FINDINGS.items()
-        if counts[finding]
-    ]
+    numbers = ((counts[finding], words) for finding, words in FINDINGS.items() if counts[finding])
+    findings = (f"{number} {'is' if number == 1 else 'are'} {words}" for number, words in numbers)
     return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(findings)}."
 
 
@@ -86,31 +81,26 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
     within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
-    return Table(
+    caption = (
         "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
         f"innovation over its stated variance, which is 1 if that variance is right.{within} The PDF has the "
-        f"{PRINTED_RUNS} runs with the smallest p-values.",
-        ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict"),
-        rows,
-        "innovation-verdicts",
-        "llrrl",
-        tuple(sorted(sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])[:PRINTED_RUNS])),
+        f"{PRINTED_RUNS} runs with the smallest p-values."
     )
+    header = ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict")
+    order = sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])
+    return Table(caption, header, rows, "innovation-verdicts", "llrrl", tuple(sorted(order[:PRINTED_RUNS])))
 
 
 def tests(context: Context, explained: list[Explanation]) -> Table:
     """Every test of every run."""
     rows = tuple((*run_cells(e), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
-    header = ("Log", "Joint", "NIS", "ACF(1), $q$", "ACF(1), $dot(q)$", "Ljung-Box, $q$", "Ljung-Box, $dot(q)$")
-    return Table(
+    caption = (
         "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
         "autocorrelations (ACF); p-values of the Ljung-Box test and of the cumulative periodogram for white noise. "
-        "Times: the error of the sample times, if the other joints of the log show the same error.",
-        (*header, "Periodogram, $q$", "Periodogram, $dot(q)$", "Times"),
-        rows,
-        "innovation-table",
-        "llrrrrrrrr",
+        "Times: the error of the sample times, if the other joints of the log show the same error."
     )
+    by_signal = (f"{test}, ${x}$" for test in ("ACF(1)", "Ljung-Box", "Periodogram") for x in ("q", "dot(q)"))
+    return Table(caption, ("Log", "Joint", "NIS", *by_signal, "Times"), rows, "innovation-table", "llrrrrrrrr")
 
 
 def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
@@ -137,14 +127,12 @@ def trials(e: Explanation) -> Table:
         )
         for i in order
     )
-    return Table(
-        f"{title(e.joint)} in {literal(e.log)}: the removed cause, the number of tested samples, the random walk over "
-        "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run.",
-        ("Without", "Samples", "Random walk", "Smallest $p$", "Explains"),
-        rows,
-        f"trials-{e.log}-{e.joint}",
-        "lrrrl",
+    caption = (
+        f"{run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
+        "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
     )
+    header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
+    return Table(caption, header, rows, f"trials-{e.log}-{e.joint}", "lrrrl")
 
 
 def least_probability(e: Explanation) -> Column:

@@ -146,3 +146,12 @@ def normal_plot(title: str, x: Column, axis: str) -> Panel:
     slope = (high - low) / (2 * norm.ppf(0.75))
     line = Reference(float(slope), float((low + high) / 2), "normal", "vermillion")
     return Panel(title, "normal quantile", axis, (Points(scores[shown], ordered[shown], "", "blue"), line))
+
+
+def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Prediction]:
+    """The predictions of free motion in logs that no fit uses; all of them if there is none."""
+    return [
+        p
+        for p in predictions
+        if p.role != "identification" and context.study.log(p.log).has_known_free_motion
+    ] or predictions  # fmt: skip

@@ -14,6 +14,7 @@ from davinci_forces.report.sections.parts import (
     run_cells,
     run_name,
     section_of,
+    of_free_motion,
 )
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
@@ -30,7 +31,8 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "so scores there are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
         "after the noise variance is subtracted. "
-        "Samples at which the joint stands still are left out, as friction can then take any value."
+        "Samples at which the joint stands still are left out, as friction can then take any value. A contact log "
+        "whose windows the study does not state is scored with its contacts, so it is no worst run."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")
@@ -44,7 +46,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield from paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
     scores = (*estimators(context, predictions), every_score(context, predictions))
     yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
-    unseen = [p for p in used if p.role != "identification"] or used
+    unseen = of_free_motion(context, used)
     joints = dict.fromkeys(p.joint for p in unseen)
     worst = [max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error) for joint in joints]
     worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))  # the worst of all on paper
@@ -56,6 +58,7 @@ def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
     share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
     how = LEFT_OUT.get(p.scheme, p.scheme.removeprefix("leave ").removesuffix(" out"))
+    how = how if context.study.log(p.log).has_known_free_motion else f"{how}; contacts in it"
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
     error, mean, r2, ceiling = context.numbers(p.prefix, ("model_error", "mean_error", "r2", "r2_ceiling"), 2)
@@ -93,8 +96,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
     """The model error of one fit in the worst run of a joint that was not fitted."""
     of_joint = [p for p in predictions if p.joint == joint]
-    unseen = [p for p in of_joint if p.role != "identification"] or of_joint
-    unseen = [p for p in unseen if (p.model, p.estimator) == (model, estimator)]
+    unseen = [p for p in of_free_motion(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
     if not unseen:
         return "–"
     return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)

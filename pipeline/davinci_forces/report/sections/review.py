@@ -22,14 +22,12 @@ def blocks(context: Context) -> Iterator[Block]:
         "Reviewers rated figures and runs on the page of this report, or of an earlier one. Their ratings are stored "
         "in `review.toml` beside study.toml, and are no part of the report's ID."
     )
-    if old:
-        yield Verdict(
-            "warn",
-            f"The numbers have changed since {count(len(old), 'rating')} of {len(context.ratings)}: "
-            "`results.json` is not the one that was rated. Look again at the figures and runs of these ratings.",
-        )
-    else:
-        yield Verdict("info", "All ratings are of the numbers that this report shows.")
+    changed = (
+        f"The numbers have changed since {count(len(old), 'rating')} of {len(context.ratings)}: "
+        "`results.json` is not the one that was rated. Look again at the figures and runs of these ratings."
+    )
+    same = "All ratings are of the numbers that this report shows."
+    yield Verdict("warn", changed) if old else Verdict("info", same)
     rows = tuple(
         (
             subject(context, rating),

@@ -1,9 +1,13 @@
 """The robot that the analysis assumes: its kinematic chain, its links, and the workspace of its tip."""
 
+from collections import Counter
 from collections.abc import Iterator
+
+import numpy as np
 
 from davinci_forces.records import Links, Pose, Workspace
 from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
+from davinci_forces.report.content.marks import Colour
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of
 
@@ -12,23 +16,26 @@ from davinci_forces.report.sections.parts import section_of
 def section(context: Context, records: list[Links]) -> Iterator[Block]:
     """The chain and its table.  Tables 3.1, 4.2, Fig 3.5"""
     links, worst = records[0], context.results["robot.worst_condition"].number(3)
+    tabulated = not np.isnan(links.alpha).all()
+    chain_kind = "a Denavit-Hartenberg chain" if tabulated else "a tree of links"
+    shared = max(Counter(links.moved_by[links.moved_by > 0].tolist()).values(), default=0) > 1
+    parallelogram = (
+        "The links of the parallelogram share a coordinate, so the tool pivots about a remote centre without a bearing "
+        "there. "
+    )
     yield Prose(
-        f"The {literal(context.study.robot.title)} is modelled as a Denavit-Hartenberg chain. The parallelogram's "
-        "links share the coordinate of the pitch, so the tool pivots about a remote centre without a bearing there. "
+        f"The {literal(context.study.robot.title)} is modelled as {chain_kind}. {parallelogram if shared else ''}"
         "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
         f"{worst} within the joints' limits: this factor can multiply the relative error of an effort."
     )
-    rows = tuple(
-        (
-            literal(link),
-            literal(links.parent[i]),
-            "–" if links.moved_by[i] == 0 else f"$q_{links.moved_by[i]}$",
-            *context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4),
-        )
-        for i, link in enumerate(links.link)
-    )
+    rows = []
+    for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):
+        moved_by = f"$q_{coordinate}$" if coordinate else "–"
+        numbers = context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4)
+        rows.append((literal(link), literal(parent), moved_by, *numbers))
     header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
-    yield Table("Denavit-Hartenberg parameters and masses of the links.", header, rows, "links-table", "lllrrrrr")
+    caption = "Denavit-Hartenberg parameters and masses" if tabulated else "Joints and masses"
+    yield Table(f"{caption} of the links.", header, tuple(rows), "links-table", "lllrrrrr")
     yield chain(context)
 
 
@@ -48,16 +55,15 @@ def walk(pose: Pose) -> list[int]:
 
 def chain(context: Context) -> Figure3D:
     """The chain at three configurations, and the places that its tip reaches."""
-    colours = {"zero": "black", "low": "blue", "high": "vermillion"}
-    configurations = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
+    configurations: dict[str, tuple[str, Colour]] = {
+        "zero": ("q = 0", "black"), "low": ("lower limits", "blue"), "high": ("upper limits", "vermillion"),
+    }  # fmt: skip
     marks: list[Line3D | Points3D] = []
     for workspace in context.catalogue.records(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
     for pose in context.catalogue.records(Pose):
-        path = walk(pose)
-        marks.append(
-            Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
-        )
+        path, (name, colour) = walk(pose), configurations[pose.pose]
+        marks.append(Line3D(pose.x[path], pose.y[path], pose.z[path], name, colour))
     return Figure3D(
         "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
         "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",

@@ -76,11 +76,9 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
     half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
     if np.isnan(limit.filter_lag_std):
         side = "above" if limit.k_t_limit > stiffest.stiffness else "below"
-        return Verdict(
-            "info",
-            f"Hand “{name}”: the limit, {headline}, is {side} the measured tissue, {tissue}. The filter's lag is "
-            "assumed, not measured in logs, so stability is not rated.",
-        )
+        text = f"Hand “{name}”: the limit, {headline}, is {side} the measured tissue, {tissue}."
+        why = "The filter's lag is assumed, not measured in logs, so stability is not rated."
+        return Verdict("info", f"{text} {why}")
     stable = limit.k_t_limit - half > stiffest.stiffness and limit.delay_margin != 0.0  # NaN if no delay is too much
     words = f"{'**stable** against' if stable else 'may oscillate against'} the measured tissue, {tissue}"
     if limit.k_t_limit + half < stiffest.stiffness:
@@ -141,9 +139,11 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
     marks: list[AnyMark] = []
     for limit in context.catalogue.records(StabilityLimit):
         top = np.full(len(limit.k_h), limit.k_t_switching.max())
-        marks.append(Band(limit.k_h, limit.k_t_cqlf, top, beyond, "vermillion"))
-        marks.append(Line(limit.k_h, limit.k_t_cqlf, "Lyapunov function", "black", "solid"))
-        marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
+        marks += [
+            Band(limit.k_h, limit.k_t_cqlf, top, beyond, "vermillion"),
+            Line(limit.k_h, limit.k_t_cqlf, "Lyapunov function", "black", "solid"),
+            Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"),
+        ]
     marks += tissue_lines(context, tissues)
     across, up = "stiffness of the hand [N/m]", "stiffness of tissue [N/m]"
     return Panel("Without delay", across, up, tuple(marks), x_log=True, y_log=True)

@@ -194,18 +194,15 @@ def surface_map(tissue: Stiffness) -> Figure:
     k = tissue.k_t
     edges = np.quantile(k, [0.0, 0.25, 0.5, 0.75, 1.0])
     place = np.clip(np.searchsorted(edges, k, side="right") - 1, 0, 3)
-    marks = tuple(
-        Points(
-            MM * places[across][place == i], MM * places[along][place == i],
-            f"{edges[i]:.0f} to {edges[i + 1]:.0f} N/m", colour,
-        )
-        for i, colour in enumerate(CLASSES)
-    )  # fmt: skip
+    marks = []
+    for i, colour in enumerate(CLASSES):
+        x, y = MM * places[across][place == i], MM * places[along][place == i]
+        marks.append(Points(x, y, f"{edges[i]:.0f} to {edges[i + 1]:.0f} N/m", colour))
     name = literal(tissue.log)
     return Figure(
         f"{name}: stiffness over the surface, at the deepest sample of each push in contact.",
         f"Where {pushes(len(tissue))} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
-        (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", marks),),
+        (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", tuple(marks)),),
         f"tissue-map-{tissue.log}",
         height=70,
     )
@@ -223,8 +220,8 @@ def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]
         prefix = f"tissue.{tissue.log}"
         rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
         if len(rows) <= MAX_PUSHES_LISTED:
-            name = f"{literal(tissue.log)}: every push"
-            yield Table(f"{name}. {caption}", header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
+            heading = f"{literal(tissue.log)}: every push. {caption}"
+            yield Table(heading, header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
 
 def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Table]:

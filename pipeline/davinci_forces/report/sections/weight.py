@@ -137,24 +137,21 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
     name, subtracted = literal(weight.log), ", before the tare is subtracted" if weight.tare else ""
     once = "over one averaged period" if loads[0].period else "over the run"
+    panels = []
+    for load in loads:
+        measured = Line(load.t, load.tau_ext, "measured minus model", "sky")
+        caused = Line(load.t, mass * load.load + offsets[load.joint], f"{by} mass", "vermillion", "dashed")
+        effort = label(load, "tau_ext", "external effort")
+        panels.append(Panel(title(load.joint), "time [s]", effort, (measured, caused)))
     return Figure(
         f"{name}: external effort {once} of each joint that carries the mass{subtracted}, and the effort of the {by} "
         "mass plus the joint's offset of the day.",
         f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
         f"{Number(mass, 'kg')}.",
-        tuple(
-            Panel(
-                title(load.joint), "time [s]", label(load, "tau_ext", "external effort"),
-                (
-                    Line(load.t, load.tau_ext, "measured minus model", "sky"),
-                    Line(load.t, mass * load.load + offsets[load.joint], f"{by} mass", "vermillion", "dashed"),
-                ),
-            )
-            for load in loads
-        ),
+        tuple(panels),
         f"weight-figure-{weight.log}",
         height=35,
-    )  # fmt: skip
+    )
 
 
 def by_joint(context: Context, weight: Weight) -> Table:

@@ -31,20 +31,12 @@ def shrink(svg: str) -> str:
     def shorten(tag: re.Match[str]) -> str:
         """A tag with a class for its style, and quotation marks that a data URL need not escape."""
         short = re.sub(
-            r' style="([^"]*)"', lambda style: f' class="{styles.setdefault(style[1], _letters(len(styles)))}"', tag[0]
+            r' style="([^"]*)"', lambda style: f' class="{styles.setdefault(style[1], f"c{len(styles)}")}"', tag[0]
         )
         return short.replace('"', "'")
 
     start, *rest = re.split("(?<=>)", re.sub(r"<[^<>]+>", shorten, svg), maxsplit=1)
     return start + _sheet(styles) + "".join(rest)
-
-
-def _letters(number: int) -> str:
-    """The name of a class: a, b, ..., z, ba, bb, ..."""
-    name = ""
-    while not name or number:
-        name, number = chr(97 + number % 26) + name, number // 26
-    return name
 
 
 def _sheet(styles: dict[str, str]) -> str:

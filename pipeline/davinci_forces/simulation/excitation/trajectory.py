@@ -62,13 +62,11 @@ class ExcitationTrajectory:
     @property
     def violations(self) -> list[str]:
         """The limits that the trajectory exceeds, one a line."""
-        names = zip(
-            ("q", "dq", "ddq"), ("", "/s", "/s^2"), fourier.ranges(self.series), self.problem.limits, strict=True
-        )
-        unit = self.joint.unit("{position}")
+        unit, ranges = self.joint.unit("{position}"), fourier.ranges(self.series)
+        symbols = (("q", ""), ("dq", "/s"), ("ddq", "/s^2"))
         return [
             f"{name} goes from {lowest:.4f} to {highest:.4f} {unit}{per}, its limits are {low:g} and {high:g}"
-            for name, per, (lowest, highest), (low, high) in names
+            for (name, per), (lowest, highest), (low, high) in zip(symbols, ranges, self.problem.limits, strict=True)
             if lowest < low or highest > high
         ]
 
@@ -97,11 +95,8 @@ class ExcitationTrajectory:
 
 def as_facts(standard_errors: Sequence[ExpectedParameter]) -> dict[str, Any]:
     """Expected standard errors in JSON's types; nothing without noise."""
-    return (
-        {"standard_errors": {p.name: {"std": finite(p.std), "unit": p.unit} for p in standard_errors}}
-        if standard_errors
-        else {}
-    )
+    stated = {p.name: {"std": finite(p.std), "unit": p.unit} for p in standard_errors}
+    return {"standard_errors": stated} if stated else {}
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
@@ -170,9 +165,8 @@ def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
     t = np.linspace(0.0, excitation.series.period, 1001)
     unit = excitation.joint.unit("{position}")
     labels = (f"position [{unit}]", f"velocity [{unit}/s]", f"acceleration [{unit}/s²]")
-    for ax, values, limits, label in zip(
-        axes, fourier.motion(excitation.series, t), excitation.problem.limits, labels, strict=True
-    ):
+    motion = fourier.motion(excitation.series, t)
+    for ax, values, limits, label in zip(axes, motion, excitation.problem.limits, labels, strict=True):
         ax.plot(t, values, color="#0072b2")
         for limit in limits:
             ax.axhline(limit, color="#d55e00", linestyle="--", linewidth=1.0)

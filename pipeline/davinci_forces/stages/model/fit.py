@@ -129,7 +129,7 @@ def fit_joint(
         try:
             estimate = estimator(name)(regression)
         except NotIdentifiable as error:
-            yield diagnostic("fit", model.group, "warning", f"{model.group}: {name} is left out: {error}")
+            yield diagnostic("fit", model.group, "note", f"{model.group}: {name} is left out: {error}")
             continue
         estimates[name] = estimate
         yield fit_record(parts, model, name, regression, estimate, lowpass)

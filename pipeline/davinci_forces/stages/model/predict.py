@@ -31,6 +31,8 @@ from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
+MIN_LOST = 0.01  # share of a log that is not scored, from which a warning says so
+
 
 def run(
     motions: Collection[Motion],
@@ -79,8 +81,11 @@ def predict_joint(
         message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
-    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & is_evaluated(motion))]:
-        yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", "warning", *steps)
+    if steps := spans(motion.t, ~scored & is_evaluated(motion)):
+        lost = sum(end - start for start, end in steps) / (motion.t[-1] - motion.t[0])
+        severity = "warning" if lost > MIN_LOST else "note"
+        texts = [step_warning(name, *step) for step in steps]
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", severity, *texts)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
         yield scorer.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))

@@ -1,6 +1,7 @@
 """Find the period of every identification log and average its periods."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -206,10 +207,14 @@ def average_joint(
     """Average one joint over its periods at each phase, from the first used sample on."""
     slow_tau = lowpass_segments(signal.tau, signal.segment, signal.rate, lowpass)
     rms_tau = float(np.sqrt(np.mean(slow_tau[used] ** 2))) or 1.0
-    tau = phased.fold(signal.tau[used])
+    folded = {symbol: phased.fold(getattr(signal, symbol)[used]) for symbol in MEASURED}
+    q, tau = folded["q"], folded["tau"]
     white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
     relative_noise = white * float(np.sqrt(share_passed(signal.rate, lowpass))) / rms_tau
-    q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])
+    columns: dict[str, Any] = {}
+    for symbol, x in folded.items():
+        columns |= {symbol: x.mean, f"{symbol}_var": x.var, f"sigma_{symbol}": averaging.noise_std(x)}
+        columns[f"sigma_{symbol}_std"] = error_of_pooled_mean(x.var, function=np.sqrt)
     yield Average(
         log=signal.log,
         joint=signal.joint,
@@ -219,26 +224,16 @@ def average_joint(
         stated_period=stated,
         periods=whole_periods(phased.t, period.length, signal.rate),
         t_start=float(phased.t[0]),
-        sigma_q=averaging.noise_std(q),
-        sigma_q_std=error_of_pooled_mean(q.var, function=np.sqrt),
-        sigma_dq=averaging.noise_std(dq),
-        sigma_dq_std=error_of_pooled_mean(dq.var, function=np.sqrt),
-        sigma_tau=averaging.noise_std(tau),
-        sigma_tau_std=error_of_pooled_mean(tau.var, function=np.sqrt),
         sigma_tau_white=white,
         relative_noise=relative_noise,
         relative_noise_std=relative_noise / float(np.sqrt(2.0 * len(used))),  # the noise is white
         t=np.arange(phased.K) / phased.K * period.length,
-        q=q.mean,
-        dq=dq.mean,
-        tau=tau.mean,
-        q_var=q.var,
-        dq_var=dq.var,
-        tau_var=tau.var,
         tau_alternating=averaging.alternating_mean(tau, phased),
         count=q.counts,
+        **columns,
     )
-    yield PeriodResidual(signal.log, signal.joint, t=phased.t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)
+    noise = {f"{symbol}_noise": x.noise for symbol, x in folded.items()}
+    yield PeriodResidual(signal.log, signal.joint, t=phased.t, **noise)
 
 
 def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) -> float:

@@ -57,9 +57,7 @@ def gather(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[A
     yield ArmCorrelation(
         robot=robot.name,
         source=np.array([row.log for row in rows], object),
-        rho_12=np.array([row.rho_12 for row in rows]),
-        rho_13=np.array([row.rho_13 for row in rows]),
-        rho_23=np.array([row.rho_23 for row in rows]),
+        **{name: np.array([getattr(row, name) for row in rows]) for name in ("rho_12", "rho_13", "rho_23")},
     )
 
 

@@ -10,8 +10,16 @@ from davinci_forces.filters.response import noise_model
 from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
-from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand, cqlf_limit, energy, switching_limit
-from davinci_forces.haptics.maths.motion import Law, at_contact, simulate_switching, worst
+from davinci_forces.haptics.maths.bimodal import (
+    THESIS_HAND,
+    Law,
+    at_contact,
+    cqlf_limit,
+    energy,
+    simulate_switching,
+    switching_limit,
+    worst,
+)
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
@@ -65,7 +73,7 @@ def run(
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
         yield limits.limits_of(scenario, name, hand, loop, recordings, () if haptics.body else bodies[1:])
-        yield haptic_run(name, hand, scenario)
+        yield haptic.experiment(scenario, name, hand)
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
@@ -131,14 +139,4 @@ def haptic_response(
         rendered_stiffness=gain * share * stiffness, transparency=share,
         felt_delay=float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.late)), frequency=answer.frequency,
         felt_share=answer.share, felt_late=answer.late,
-    )  # fmt: skip
-
-
-def haptic_run(name: str, hand: Hand, scenario: HapticScenario) -> HapticRun:
-    """The forces that one hand feels."""
-    run = haptic.experiment(scenario, hand)
-    return HapticRun(
-        hand=name, out_of_reach=int(run.thrown), true_peak=float(run.true.max()), felt_peak=float(run.felt.max()),
-        felt_error=run.error, t=run.t, plan_x=run.plan, hand_x=run.x, arm_x=run.q, true_force=run.true,
-        felt_force=run.felt,
     )  # fmt: skip

@@ -164,7 +164,8 @@ def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
     if best is not None:
         fitted = force_of(best, push.depth_in_contact, push.rate)
         fitted = fitted + float(np.mean((push.force - fitted)[inside]))
-    return Push(
+    return Push.like(
+        push,
         log=log,
         push=push.number,
         contact=push.contact.state,
@@ -176,9 +177,6 @@ def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
         onset_depth=push.contact.onset,
         onset_depth_std=push.contact.onset_std,
         release_depth=push.contact.release,
-        t=push.t,
-        depth=push.depth,
-        force=push.force,
         fitted=np.where(inside, fitted, np.nan),
         x=push.place[:, 0],
         y=push.place[:, 1],

@@ -14,6 +14,7 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
+    Number,
     OnScreen,
     Panel,
     Prose,
@@ -28,9 +29,10 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import is_of_link, run_name
+from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name
 from davinci_forces.report.verdicts import is_impossible
 
+SIGNED_FRICTION = ("Coulomb friction", "presliding friction", "smooth friction")  # with the sign of the velocity
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
 
 
@@ -62,6 +64,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     used = context.used_record(joint) or plain
     yield equation(joint, used)
     yield parameters(context, joint, used)
+    yield from sliding_friction(joint, used)
     if used is not plain:
         yield Prose(compared_with_plain(context, joint, used, plain))
     model, by = (used.model, used.estimator) if used is plain else (CHOSEN, f"{used.model}.{used.estimator}")
@@ -72,7 +75,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
             yield from shown
         else:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
-    yield from unidentified_parameters(context, joint)
+    yield from unidentified_parameters(context, joint, used is plain)
     yield from implausible([used] if used is not plain else fits, joint)
     yield from left_out(context, joint)
     yield comparison(context, fits)
@@ -95,6 +98,15 @@ def equation(joint: str, fit: Fit) -> Equation:
     return Equation(f"tau = {' + '.join(terms)}", f"effort is the sum of {', '.join(names)}, each times its parameter")
 
 
+def sliding_friction(joint: str, fit: Fit) -> Iterator[Prose]:
+    """State the friction far from rest, where the terms that change sign with the velocity add up."""
+    names = {i: str(fit.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(fit, joint)}
+    rows = [i for i, name in names.items() if name.startswith(SIGNED_FRICTION) and "," not in name]
+    if len(rows) > 1:
+        effort = Number(float(fit.theta[rows].sum()), format_unit(str(fit.unit[rows[0]])), digits=3)
+        yield Prose(f"Far from rest, {' and '.join(names[i] for i in rows)} add up to {effort}.")
+
+
 def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
     """State what distinguishes the model in use from the joint by itself, and what it gains on unseen data."""
     base = {str(name) for name in plain.parameter}
@@ -114,10 +126,10 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     changed += [f"its estimator is {title_of(used.estimator)}"] if used.estimator != plain.estimator else []
     by = "least squares (LSE)" if plain.estimator == "lse" else title_of(plain.estimator)
     text = f"Compared with the plain model (this joint alone, by {by}): {'; '.join(changed)}."
-    unseen = [p for p in context.catalogue.select(Prediction, joint=joint, model=CHOSEN) if p.role != "identification"]
-    if not unseen:
+    predictions = context.catalogue.select(Prediction, joint=joint, model=CHOSEN)
+    if all(p.role == "identification" for p in predictions):
         return text
-    worst = max(unseen, key=lambda p: p.relative_error)
+    worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
     before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
     after = context.number(f"{worst.prefix}.relative_error", 3)
     where = f"Of the logs that were not fitted, its relative error (noise included) is largest in {literal(worst.log)}"
@@ -219,11 +231,12 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     return OnScreen(f"{title(group)}: all fits, and tests of them", f"all-fits-{group}", (table, *more))
 
 
-def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:
-    """Parameters that the identification logs of a joint do not determine."""
+def unidentified_parameters(context: Context, joint: str, is_used: bool) -> Iterator[Verdict]:
+    """Parameters of the plain model that the identification logs of a joint do not determine."""
     for record in context.catalogue.select(Identifiability, group=joint):
         if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
-            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
+            text = f"{text[:1].upper()}{text[1:]}" if is_used else f"In the plain model, {text}"
+            yield Verdict("info", f"{text}. {record.advice}.")
 
 
 def correlations(context: Context, joint: str) -> Iterator[Block]:

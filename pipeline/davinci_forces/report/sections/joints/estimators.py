@@ -45,21 +45,15 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     named = ", ".join(map(estimator_name, residuals))
     largest, verb = max(apart[name] for name in others), "is" if len(same) == 1 else "are"
     alike = f" {' and '.join(map(estimator_name, same))} {verb} the same as least squares." if same else ""
+    models = (Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items())
+    differences = (Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items())
     yield Figure(
         f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares.{alike}",
         f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
         (
-            Panel(
-                "Averaged effort and models", "time [s]", effort,
-                (
-                    Line(plain.t, plain.tau, "measured", "sky"),
-                    *(Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items()),
-                ),
-            ),
-            Panel(
-                "Difference from least squares", "time [s]", effort,
-                tuple(Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items()),
-            ),
+            Panel("Averaged effort and models", "time [s]", effort,
+                  (Line(plain.t, plain.tau, "measured", "sky"), *models)),
+            Panel("Difference from least squares", "time [s]", effort, tuple(differences)),
         ),
         f"estimators-{fit.group}",
         columns=2,

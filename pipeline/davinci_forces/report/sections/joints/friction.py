@@ -35,15 +35,14 @@ def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
 
 def panel(m: FrictionMap) -> Panel:
     """One map."""
-    marks = []
-    for gaining, name, colour in BRANCHES:
-        branch = m.gaining == gaining
-        if branch.any():
-            marks.append(Points(m.dq[branch], m.tau_friction[branch], name, colour, y_std=m.tau_friction_std[branch]))
-    return Panel(
-        f"{m.log} ({m.model})", label(m, "dq", "velocity"), label(m, "tau_friction", "friction"),
-        (*marks, *curves(m)),
-    )  # fmt: skip
+    branches = [(m.gaining == gaining, name, colour) for gaining, name, colour in BRANCHES]
+    marks = [
+        Points(m.dq[branch], m.tau_friction[branch], name, colour, y_std=m.tau_friction_std[branch])
+        for branch, name, colour in branches
+        if branch.any()
+    ]
+    velocity, friction = label(m, "dq", "velocity"), label(m, "tau_friction", "friction")
+    return Panel(f"{m.log} ({m.model})", velocity, friction, (*marks, *curves(m)))
 
 
 def curves(m: FrictionMap) -> Iterator[Line]:
@@ -54,10 +53,8 @@ def curves(m: FrictionMap) -> Iterator[Line]:
         for side in (m.dq[ordered] < 0, m.dq[ordered] > 0):
             part = ordered[side]
             if len(part):
-                named = "model" if rows is branches[0] or m.model == "independent" else ""
-                yield Line(
-                    m.dq[part], m.tau_friction_hat[part], named if part[0] == ordered[0] else "", "black", "solid"
-                )
+                is_first = part[0] == ordered[0] and (rows is branches[0] or m.model == "independent")
+                yield Line(m.dq[part], m.tau_friction_hat[part], "model" if is_first else "", "black", "solid")
 
 
 def in_words(m: FrictionMap) -> str:

@@ -28,6 +28,7 @@ from davinci_forces.report.sections.summary.opening import (
     as_list,
     logs_in_words,
     measurements,
+    name_in_sentence,
     nothing_identified,
     sign_off,
     verdict_sentence,
@@ -46,7 +47,7 @@ from davinci_forces.robots.robot import Kind
 
 SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
 MAX_IN_COLUMN = 3  # panels below each other on page one
-ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 65.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
+ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
 def section(context: Context) -> Section:
@@ -106,7 +107,8 @@ def caption(contacts: list[Contact]) -> str:
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Of the logs in which only this joint is touched (else of all), that with the largest model error is shown."
-    return f"External effort of each joint, contact windows shaded. {which} {level}"
+    shaded = ", contact windows shaded" if any(contact.stated.any() for contact in contacts) else ""
+    return f"External effort of each joint{shaded}. {which} {level}"
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -131,9 +133,23 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
         return f"{text} No contact is measured: {why}."
     text = f"{text} A window counts as a contact for every joint on which it is measured."
     contacts_in_words = count(windows, "contact")
+    peaks = largest_peaks(context, contacts)
     if not any(contact.stated.any() for contact in contacts):
-        return f"{text} **{contacts_in_words} were found above the alarm level; the study states none.**"
-    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level.**"
+        return f"{text} **{contacts_in_words} found above the alarm level; the study states none. {peaks}**"
+    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level. {peaks}**"
+
+
+def largest_peaks(context: Context, contacts: list[Contact]) -> str:
+    """State the largest peak of each joint with its standard error, and the log."""
+    joints: dict[str, list[tuple[float, str, int]]] = {}
+    for contact in contacts:
+        row = int(np.argmax(np.abs(contact.peak)))
+        joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1))
+    peaks = [
+        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)})"
+        for joint, (_, log, number) in ((joint, max(largest)) for joint, largest in joints.items())
+    ]
+    return f"Largest: {as_list(peaks)}."
 
 
 def efforts_in_words(context: Context) -> str:
@@ -239,7 +255,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     for diagnostic in context.catalogue.records(Diagnostic):
         for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True):
             if severity == "warning":
-                yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text)
+                yield 6.0 if diagnostic.stage in SPOILS_ALL else 1.5, literal(text.replace("`", ""))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:

@@ -30,14 +30,14 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that can be believed, and what limits the others."""
     fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow]
     levels = [
-        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on the {name_in_sentence(t.joint)}"
+        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on {name_in_sentence(t.joint)}"
         for t in fine
         if t.space is not None
     ]
     parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine])
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
-    which = f"the {as_list(narrow)}" if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
+    which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
         parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["all 95 % bands are wide enough"]
     text = "; ".join(parts) or "no effort was estimated in free space"
@@ -48,20 +48,24 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
     """State the model errors of joints that are not fine, those of one kind of path and one verdict together."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for trusted in trusts:
-        name = f"the {name_in_sentence(trusted.joint)}"
+        name = name_in_sentence(trusted.joint)
         path = "the fitted path" if trusted.same_path else "an unseen path"
         level, error = trusted.level, f"{percent(trusted.share)} on {name}"
+        narrow = "narrow" if level == "good" else ""
         if trusted.fineness > DETECTABLE:
             level, error = "bad", f"{error}, whose detection level is above the effort sought"
-        kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
+        kinds.setdefault((path, "too much to be believed" if level == "bad" else narrow), []).append(error)
     for (path, why), joints in kinds.items():
-        follows = why or f"so judge {'its' if len(joints) == 1 else 'their'} efforts with caution"
+        whose = "its" if len(joints) == 1 else "their"
+        caution = f"so judge {whose} efforts with caution"
+        follows = f"but {whose} band is too narrow" if why == "narrow" else why or caution
         yield f"on {path} the model errs by {as_list(joints)}, {follows}"
 
 
 def name_in_sentence(joint: str) -> str:
-    """The name of a joint within a sentence."""
-    return literal(joint.replace("_", " "))
+    """The name of a joint within a sentence; one that ends in a number is a name without an article."""
+    name = literal(joint.replace("_", " "))
+    return name if joint[-1].isdigit() else f"the {name}"
 
 
 def as_list(parts: Sequence[str]) -> str:
