@@ -1,7 +1,6 @@
-"""Filters that track the external effort: one module each, exporting `track` and `NAME`, listed below."""
+"""Filters that track the external effort: one module each, exporting `blocks`, `track` and `NAME`."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -37,18 +36,12 @@ def filter_parts(
 
 def filter_blocks(name: str, parts: Sequence[Recording], noise: NoiseModel) -> Iterator[Block]:
     """Yield the blocks of a filter's pass over the parts of a recording."""
-    blocks: BlockFilter = getattr(import_module(f"davinci_forces.filters.{name}"), "blocks", partial(_whole, name))
+    blocks: BlockFilter = import_module(f"davinci_forces.filters.{name}").blocks
     start = 0
     for part in parts:
         for rows, tracked in blocks(part, noise):
             yield slice(start + rows.start, start + rows.stop), tracked
         start += part.samples
-
-
-def _whole(name: str, recording: Recording, noise: NoiseModel) -> Iterator[Block]:
-    """Run a filter that takes a recording as a whole."""
-    rows = slice(0, recording.samples)
-    yield rows, tracker(name)(recording.part(rows), noise)
 
 
 def gather_blocks(blocks: Iterable[Block]) -> Iterator[Block]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, join_blocks
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.filters.sample import Belief
 from davinci_forces.filters.stepping import arguments, correct, covariances, predict, transition
 from davinci_forces.maths.compiled import compile_and_store
@@ -23,19 +23,17 @@ NAME = "Extended Kalman filter"
 LOG_2_PI = float(np.log(2.0 * np.pi))
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    return join_blocks(blocks(recording, noise), recording.samples)
-
-
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
-    """Filter a recording block by block."""
+    """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     s: Any = None
     for rows, part in input_blocks(recording):
         out = np.empty((7, part.samples))
         before, *others = arguments(part, noise)
         s = _pass(s or before, *others, *out)
         yield rows, Tracked(*out)
+
+
+track = whole(blocks)
 
 
 def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:

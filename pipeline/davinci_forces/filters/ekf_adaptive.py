@@ -11,19 +11,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
 
 NAME = "Extended Kalman filter, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Filter a recording: correct with y_k, then predict with tau_k."""
-    return join_blocks(blocks(recording, noise), recording.samples)
-
-
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
-    """Filter a recording block by block."""
+    """Filter a recording: correct with y_k, then predict with tau_k."""
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)
     return kalman.run_blocks(recording, model)
+
+
+track = whole(blocks)

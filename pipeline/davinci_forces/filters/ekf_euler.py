@@ -12,21 +12,19 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
 
 NAME = "Extended Kalman filter, forward Euler"
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    return join_blocks(blocks(recording, noise), recording.samples)
-
-
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
-    """Filter a recording block by block."""
+    """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     T_s, ddq = recording.T_s, recording.part(slice(0, recording.samples)).ddq
     jerk = np.gradient(ddq, T_s) if len(ddq) > 1 else np.zeros(1)
     step_q_var, step_dq_var = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (ddq, jerk))
     model = kalman.states(recording, noise)._replace(order=1, doubts=False)
     model.Q[:2, :2] = np.diag([noise.q_q**2 + step_q_var, noise.q_dq**2 + step_dq_var])
     return kalman.run_blocks(recording, model)
+
+
+track = whole(blocks)

@@ -73,7 +73,7 @@ def log_likelihood(recording: FilterInput, model: States, transient: int) -> flo
     return float(_loop(model, recording)(0, transient, np.empty((7, recording.samples)), *columns(recording)))
 
 
-def _loop(model: States, recording: Recording) -> Callable[..., float]:
+def _loop(model: States, recording: Recording) -> Callable[..., Any]:
     """Return the loop for consecutive blocks of a recording; it keeps the state after each.
 
     Short recordings get further states of zeros, so that all filters share one compiled loop.
@@ -83,9 +83,9 @@ def _loop(model: States, recording: Recording) -> Callable[..., float]:
     P, Phi, Q = (np.pad(A, (0, zeros)) for A in (P, Phi, Q))
     if zeros:
         in_q, in_dq = (*in_q, len(x))[:2], (*in_dq, len(x))[:2]
-    x, adapted = (*x, *[0.0] * zeros), np.array([*R, 0.0, 0.0])
-    h = 0.5 * recording.T_s**2 * (order - 1)
-    return partial(_pass, x, np.array(x), P, adapted, in_q, in_dq, *R.tolist(), Phi, Q, h, float(doubts), forgets)
+    x, (R_q, R_dq), h = (*x, *[0.0] * zeros), R.tolist(), 0.5 * recording.T_s**2 * (order - 1)
+    adapted = np.array([R_q, R_dq, 0.0, 0.0])
+    return partial(_pass, x, np.array(x), P, adapted, in_q, in_dq, R_q, R_dq, Phi, Q, h, float(doubts), forgets)
 
 
 @compile_and_store

@@ -11,20 +11,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, whole
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Momentum observer"
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Run the observer, exact for a drive that is constant over a sample."""
-    return join_blocks(blocks(recording, noise), recording.samples)
-
-
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
-    """Filter a recording block by block."""
+    """Run the observer, exact for a drive that is constant over a sample."""
     from scipy.signal import lfilter
 
     N, T_s, state = recording.samples, recording.T_s, np.zeros(0)
@@ -41,6 +36,9 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         z, state = lfilter([0.0, 1.0 - decay], [1.0, -decay], drive + K * p, zi=state)
         std = deviation(M, rows.start, K, decay, T_s, noise, initial_std)
         yield rows, Tracked(q, dq, z - K * p, std, *np.zeros((3, len(q))))
+
+
+track = whole(blocks)
 
 
 def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:

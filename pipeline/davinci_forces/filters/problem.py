@@ -102,6 +102,15 @@ def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked.
     return Tracked(**{name: asked.get(name, np.empty(0)) for name in Tracked._fields})
 
 
+def whole(blocks: BlockFilter) -> Filter:
+    """Return the filter of a whole recording, from one that filters it block by block."""
+
+    def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
+        return join_blocks(blocks(recording, noise), recording.samples)
+
+    return track
+
+
 def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[Recording]:
     """Return the segments of a joint's log for a filter, as measured; a filter restarts after each gap.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, join_blocks
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.filters.stepping import arguments, correct, gains, predict, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
@@ -21,11 +21,6 @@ from davinci_forces.maths.compiled import compile_and_store
 NAME = "Smoother"
 MIN_VARIANCE_SHARE = 1e-12  # a smoothed variance with a smaller share of the predicted one is rounding
 STORED = 15  # numbers stored per sample: its prediction, and the transition to the next sample
-
-
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Filter a recording forwards and smooth it backwards; the innovations are the filter's."""
-    return join_blocks(blocks(recording, noise), recording.samples)
 
 
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
@@ -41,6 +36,9 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         out = np.empty((4, rows.stop - rows.start))
         after = _backwards(stored, noise.r_q**2, noise.r_dq**2, after, *out, *innovations[:2])
         yield rows, Tracked(*out, *innovations)
+
+
+track = whole(blocks)
 
 
 def forwards(recording: Recording, noise: NoiseModel) -> Iterator[tuple[slice, Any, Array, Array]]:

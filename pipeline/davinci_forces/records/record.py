@@ -77,15 +77,14 @@ class Record:
 
         A record with columns of a lazy source is lazy, too.
         """
-        read, is_shared = getattr(source, "_read", None), not others.keys() >= {*cls.columns()}
-        names = cls.scalars() if read and is_shared else tuple(f.name for f in fields(cls))  # type: ignore[arg-type]
-        values = others | {name: getattr(source, name) for name in names if name not in others and hasattr(source, name)}
-        if not (read and is_shared):
-            return cls(**values)
-        columns = {name: values.pop(name) for name in cls.columns() if name in values}
-        return cls.lazy(values, len(source), lambda name, rows: (
-            columns[name][rows] if name in columns else read(name, rows)
-        ))  # fmt: skip
+        if isinstance(source, Record) and "_read" in vars(source) and not others.keys() >= {*cls.columns()}:
+            scalars = {name: others[name] if name in others else getattr(source, name) for name in cls.scalars()}
+            read = vars(source)["_read"]
+            return cls.lazy(
+                scalars, len(source), lambda name, rows: others[name][rows] if name in others else read(name, rows)
+            )
+        shared = (f.name for f in fields(cls) if f.name not in others and hasattr(source, f.name))  # type: ignore[arg-type]
+        return cls(**{name: getattr(source, name) for name in shared}, **others)
 
     @classmethod
     def lazy(cls, scalars: Mapping[str, Any], length: int, read: Callable[[str, slice], NDArray[Any]]) -> Self:
