@@ -156,7 +156,9 @@ def test_the_report_says_what_is_wanting_and_what_to_record_next():
     def about(**changes):
         (found,) = made(arm.signal("hand_pitch"), Identifiability)
         told = replace(found, **{"together": (), "not_seen": (), "advice": "", **changes})
-        return list(unidentified_parameters(SimpleNamespace(catalogue=Catalogue(lambda kind: [told])), "hand_pitch", True))
+        return list(
+            unidentified_parameters(SimpleNamespace(catalogue=Catalogue(lambda kind: [told])), "hand_pitch", True)
+        )
 
     assert about() == []
     insignificant = "inertia is not significant: 0.1 ± 0.2"

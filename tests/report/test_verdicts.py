@@ -74,7 +74,12 @@ def test_a_joint_whose_band_is_too_narrow_is_not_called_good_and_keeps_its_level
 
 @pytest.mark.parametrize(
     ("coverage", "level", "said"),
-    [(0.57, "bad", "too narrow"), (0.9, "good", "wide enough"), (0.98, "good", "wide enough"), (0.99, "info", "too wide")],
+    [
+        (0.57, "bad", "too narrow"),
+        (0.9, "good", "wide enough"),
+        (0.98, "good", "wide enough"),
+        (0.99, "info", "too wide"),
+    ],
 )
 def test_a_band_is_right_where_it_covers_what_it_says(coverage, level, said):
     assert (band(coverage), band_in_words(coverage)) == (level, said)

@@ -10,11 +10,11 @@ from davinci_forces.report.sections.parts import (
     contact_spans,
     effort_panel,
     first_on_paper,
+    of_free_motion,
     paper_or_screen,
     run_cells,
     run_name,
     section_of,
-    of_free_motion,
 )
 from davinci_forces.report.verdicts import is_out_of_log, percent
 

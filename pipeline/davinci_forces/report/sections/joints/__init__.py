@@ -125,7 +125,8 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
         changed.append(f"the effort is taken {1e3 * abs(used.effort_lag[row]):g} ms {side} the motion")
     changed += [f"its estimator is {title_of(used.estimator)}"] if used.estimator != plain.estimator else []
     by = "least squares (LSE)" if plain.estimator == "lse" else title_of(plain.estimator)
-    text = f"Compared with the plain model (this joint alone, by {by}): {'; '.join(changed)}."
+    differences = "; ".join(changed) or "it has the same terms"
+    text = f"Compared with the plain model (this joint alone, by {by}): {differences}."
     predictions = context.catalogue.select(Prediction, joint=joint, model=CHOSEN)
     if all(p.role == "identification" for p in predictions):
         return text
