@@ -12,14 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, column, whole
 
 NAME = "Extended Kalman filter, forward Euler"
 
 
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    T_s, ddq = recording.T_s, recording.part(slice(0, recording.samples)).ddq
+    T_s, ddq = recording.T_s, column(recording, lambda part: part.ddq)
     jerk = np.gradient(ddq, T_s) if len(ddq) > 1 else np.zeros(1)
     step_q_var, step_dq_var = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (ddq, jerk))
     model = kalman.states(recording, noise)._replace(order=1, doubts=False)

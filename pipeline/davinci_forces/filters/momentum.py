@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, column, whole
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.models.bias import bias
 
@@ -23,7 +23,7 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     from scipy.signal import lfilter
 
     N, T_s, state = recording.samples, recording.T_s, np.zeros(0)
-    K, decay = gain(float(np.mean(recording.part(slice(0, N)).joint.inertia)), T_s, noise)
+    K, decay = gain(float(np.mean(column(recording, lambda part: part.joint.inertia))), T_s, noise)
     for rows in row_blocks(N):
         first = max(rows.start - 1, 0)
         beside = recording.part(slice(first, min(rows.stop + 1, N))).joint.inertia  # neighbours give its derivative

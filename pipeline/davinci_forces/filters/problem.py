@@ -56,6 +56,14 @@ def input_blocks(recording: Recording) -> Iterator[tuple[slice, FilterInput]]:
     return ((rows, recording.part(rows)) for rows in row_blocks(recording.samples))
 
 
+def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
+    """Return one column (N,) of a recording."""
+    values = np.empty(recording.samples)
+    for rows, part in input_blocks(recording):
+        values[rows] = of(part)
+    return values
+
+
 def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))

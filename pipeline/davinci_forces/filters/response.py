@@ -12,7 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, ekf, filter_parts, tracker
-from davinci_forces.filters.problem import Filter, FilterInput, LongInput, NoiseModel, Recording, stationary_joint
+from davinci_forces.filters.problem import (
+    Filter,
+    FilterInput,
+    LongInput,
+    NoiseModel,
+    Recording,
+    column,
+    stationary_joint,
+)
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import VISCOUS
@@ -57,10 +65,11 @@ def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: fl
 
 def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     """Compute the rise time [s] of a filter's unit step response on a joint at rest: 1 / its steepest slope."""
-    T_s, joint = recording.T_s, recording.part(slice(0, recording.samples)).joint
+    T_s, joint = recording.T_s, recording.part(slice(0, 1)).joint
+    inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
-    inertia, step = np.full(len(t), float(np.mean(joint.inertia))), np.where(t >= BEFORE, 1.0, 0.0)
-    stepped = stationary_joint(inertia, joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
+    step = np.where(t >= BEFORE, 1.0, 0.0)
+    stepped = stationary_joint(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
     return float(T_s / max(np.diff(track(stepped, noise).tau_ext).max(), 1e-9))
 
 

@@ -81,7 +81,9 @@ class Record:
             scalars = {name: others[name] if name in others else getattr(source, name) for name in cls.scalars()}
             read = vars(source)["_read"]
             return cls.lazy(
-                scalars, len(source), lambda name, rows: others[name][rows] if name in others else read(name, rows)
+                scalars,
+                len(source),
+                lambda name, rows: others[name][rows].copy() if name in others else read(name, rows),
             )
         shared = (f.name for f in fields(cls) if f.name not in others and hasattr(source, f.name))  # type: ignore[arg-type]
         return cls(**{name: getattr(source, name) for name in shared}, **others)

@@ -41,15 +41,20 @@ def run(
     unfitted = entry.role != "identification" and entry.has_known_free_motion
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return
-    variants, identified = [(name.replace("_", "-"), name, model) for name in FILTERS], Identified(robot, fits)
+    joint = robot.joint(model.joint)
+    for label, name, variant in variants(model, Identified(robot, fits)):
+        filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau, name)
+        yield from compare(label, name, variant, filter_noise, free, PUSH[joint.kind])
+
+
+def variants(model: JointModel, identified: Identified) -> Iterator[tuple[str, str, JointModel]]:
+    """Yield a label, the name of the filter, and the model of each comparison."""
+    yield from ((name.replace("_", "-"), name, model) for name in FILTERS)
     fit = identified.fit_of(model.joint, FALLBACK)
     if fit is not None and model.model != "independent":
         independent = LogModels(identified, [model]).with_fit(model, fit)
-        variants += [(INDEPENDENT, DEFAULT, independent)] if independent.inertia.min() > 0 else []
-    joint = robot.joint(model.joint)
-    for label, name, variant in variants:
-        filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau, name)
-        yield from compare(label, name, variant, filter_noise, free, PUSH[joint.kind])
+        if independent.inertia.min() > 0:
+            yield INDEPENDENT, DEFAULT, independent
 
 
 def compare(

@@ -127,17 +127,18 @@ def apply(
     filter_noises = [noise_model(noise_of[m.joint], robot.joint(m.joint), 1.0 / m.rate, q_tau) for m in models]
     results = [innovations(longest_part(m), noise) for m, noise in zip(models, filter_noises, strict=True)]
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
-    for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
+    for model, noise, delay in zip(models, filter_noises, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
         motion = velocities(model)
         free = is_outside(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)])
-        yield from innovation_records(model, result, motion)
+        yield from innovation_records(model, results.pop(0), motion)
+        first = slice(MAX_SAMPLES_SEARCH)
+        moving = is_far_from_reversals(motion[0], 1.0 / model.rate)[first]
+        motion = motion[0][first].copy(), motion[1][first].copy()
         trials = dict(alternatives(model, along, free))
         if delay.any():
-            first = slice(MAX_SAMPLES_SEARCH)
-            trials[CLOCK] = correct_times(tried_part(model), *(x[first] for x in (*motion, delay)))
-        moving = is_far_from_reversals(motion[0], 1.0 / model.rate)
-        subject = Subject(trials, noise, free[part][:MAX_SAMPLES_SEARCH], moving[:MAX_SAMPLES_SEARCH])
+            trials[CLOCK] = correct_times(tried_part(model), *motion, delay[first])
+        subject = Subject(trials, noise, free[part][first], moving)
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
