@@ -2,6 +2,7 @@
 
 import doctest
 import gc
+import re
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +137,9 @@ def test_nothing_is_printed_and_the_folder_is_removed_with_the_object(capfd):
 def test_notebooks_show_parameters_efforts_and_contacts(identified):
     effort = identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, dq=PUSHED.dq)
     assert "gravity, sine" in identified._repr_html_()
+    title, first, *_ = repr(identified).splitlines()
+    assert title.split() == ["joint", "parameter", "value", "unit"]
+    assert re.fullmatch(r"\S+ +inertia +-?[\d.]+ ± [\d.]+ +\S.*", first)
     html = effort._repr_html_()
     assert html.count("<table") == 2
     assert f"{effort.contacts['peak'][0]:.4g}" in html

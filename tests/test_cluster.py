@@ -213,7 +213,7 @@ def test_a_task_that_fails_when_its_run_has_ended_leaves_no_diagnostic(tmp_path,
         (where.processed / terms.mark).unlink(missing_ok=True)
         raise FileNotFoundError(2, "No such file or directory", "x.partial")
 
-    monkeypatch.setattr("davinci_forces.runner.execution.open_parts", end)
+    monkeypatch.setattr("davinci_forces.logs.parts.open_parts", end)
     with pytest.raises(FileNotFoundError):
         cluster.perform_there(terms, where, task)
     assert not contents(where.processed)

@@ -94,17 +94,27 @@ def test_rows_name_what_changed_came_and_went(tmp_path):
     assert "+4.0" in said
 
 
-def test_the_ten_largest_changes_of_each_joint_come_first_and_the_rest_is_counted(tmp_path):
-    """In standard errors, by what they are about; a number without an error ranks behind those with one."""
-    keys = [f"fit.roll.lse.p{i}" for i in range(12)] + ["contact.a.roll.1.peak", "noise.a.roll.sigma", "fit.slide.m"]
-    before = dict.fromkeys(keys, (1.0, 0.1)) | {"tip.a.rms": 1.0, "ekf-euler.a.roll.level": 1.0}
-    after = {key: (2.0 + i, 0.1) for i, key in enumerate(keys)} | {"tip.a.rms": 3.0, "ekf-euler.a.roll.level": 9.0}
+def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_joint_are_listed(tmp_path):
+    """Within a rank by standard errors; a number without an error is behind those with one."""
+    keys = [f"fit.roll.lse.p{i}" for i in range(3)] + [f"fit.roll.chosen.lse.p{i}" for i in range(12)]
+    keys += ["contact.a.roll.1.peak", "noise.a.roll.sigma", "fit.slide.m", "cv.a.roll.lse.model_error"]
+    page_one = ["predict.a.roll.chosen.model_error", "effort.a.roll.coverage"]
+    before = dict.fromkeys([*keys, *page_one], (1.0, 0.1)) | {"tip.a.rms": 1.0, "ekf-euler.a.roll.level": 1.0}
+    after = {key: (2.0 + i, 0.1) for i, key in enumerate(keys)} | dict.fromkeys(page_one, (1.5, 0.1))
+    after |= {"tip.a.rms": 3.0, "ekf-euler.a.roll.level": 9.0}
     a, b = results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after)
-    roll, slide, other = call("compare", a, b).split("\n\n")[1:4]
-    listed = [line.split() for line in roll.splitlines()[2:-1]]
-    assert [row[:2] for row in listed[:8]] == [["model", f"fit.roll.lse.p{i}"] for i in range(11, 3, -1)]
-    assert [row[0] for row in listed[8:]] == ["contacts", "noise"]
-    assert roll.splitlines()[-1] == "  and 4 of model, 1 of forces: --all lists them"
+    first, roll, slide, other = call("compare", a, b).split("\n\n")[:4]
+    assert first.endswith(
+        "changed: 2 of page one, 12 of model, 1 of contacts, 2 of forces, 1 of noise, 5 of candidates"
+    )
+    listed = [line.strip().split("  ")[:2] for line in roll.splitlines()[2:-1]]
+    assert [row[0] for row in listed] == ["page one"] * 2 + ["contacts"] + ["model"] * 7
+    assert "fit.roll.chosen.lse.p11" in roll.splitlines()[5]
+    assert roll.splitlines()[-1] == "  and 5 of model, 1 of forces, 1 of noise, 4 of candidates: --all lists them"
+    every = call("compare", a, b, "--all").split("\n\n")[1].splitlines()
+    assert [line.split()[1] for line in every[-5:]] == [
+        "ekf-euler.a.roll.level", "cv.a.roll.lse.model_error", *(f"fit.roll.lse.p{i}" for i in (2, 1, 0)),
+    ]  # fmt: skip
     assert "slide: 1 changed" in slide
     assert "not of one joint: 1 changed" in other
     said = call("compare", a, b, "--all")

@@ -96,7 +96,9 @@ def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting(
     assert "`davinci-forces excite davinci hand_pitch`" in advice(
         ROBOT, ROBOT.joint("hand_pitch"), ("x is not significant",)
     )
-    assert "`davinci-forces excite arm.toml hand_roll`" in advice(arm.ARM, ROLL, ("x is not significant",))
+    assert "`davinci-forces excite arm.toml hand_roll` in the study's folder designs" in advice(
+        arm.ARM, ROLL, ("x is not significant",)
+    )
 
 
 def guess(theta, std) -> Estimate:

@@ -1,6 +1,7 @@
 """The motion of a joint without noise, and its model along a log, which all later stages start from."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std, share_passed
 from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Signal
-from davinci_forces.stages.model import fit, predict
+from davinci_forces.stages.model import choose, fit, predict
 from davinci_forces.stages.recordings import resample
 from davinci_forces.study.entries import ROLES
 from tests import arm
@@ -149,3 +150,13 @@ def test_the_stage_has_a_record_of_its_own_for_every_joint_that_a_fit_describes(
     signal, fits, _ = identified
     made = list(predict.apply([arm.motion(signal)], [], [], fits, entry(), arm.ARM, fit="independent.lse"))
     assert [record.key for record in made] == [("run", "hand_roll")]
+
+
+def test_a_log_without_some_joints_of_the_arm_is_named_with_the_remedy():
+    def log(name: str, *joints: str):
+        return SimpleNamespace(joints=joints, records=[SimpleNamespace(log=name, joint=joints[0])])
+
+    names = [joint.name for joint in arm.ARM.joints]
+    (warning,) = choose.not_of_arm([log("whole", *names), log("part", names[0])], arm.ARM)
+    assert warning.severity.tolist() == ["warning"]
+    assert warning.text[0].startswith(f"part: no model of the whole arm is fitted to this log, as it lacks {names[1]}")

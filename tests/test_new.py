@@ -12,6 +12,7 @@ import davinci_forces
 from davinci_forces import robots
 from davinci_forces.maths.signals import columns
 from davinci_forces.study import reading
+from tests.simulation.six_joints import write
 from tests.test_runs import call
 
 RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
@@ -106,6 +107,15 @@ def test_a_joint_at_rest_stays_commented_out_with_the_reason(tmp_path):
     assert '# "joint_3.q" = "column_3"  # the joint does not move' in (tmp_path / "study.toml").read_text()
 
 
+def test_the_comment_of_a_joint_at_rest_says_what_it_means_to_an_arm_with_a_chain(tmp_path):
+    t, q, dq = motion(6)
+    q[:, 2:], dq[:, 2:] = 0.7, 0.0
+    write(tmp_path)
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    note = "the joint does not move; without it, no model of the whole arm is fitted to this log"
+    assert f'# "elbow.q" = "column_3"  # {note}' in (tmp_path / "study.toml").read_text()
+
+
 @pytest.mark.parametrize(
     "names",
     [
@@ -155,6 +165,29 @@ def test_a_robot_file_is_taken_where_it_fits_and_never_overwritten(tmp_path):
     assert 'robot = "arm.toml"' in (tmp_path / "study.toml").read_text()
     assert (tmp_path / "arm.toml").read_text() == written
     assert sorted(p.name for p in tmp_path.glob("*.toml")) == ["arm.toml", "robot.toml", "study.toml"]
+
+
+def test_a_written_robot_has_the_limits_that_the_logs_reach(tmp_path):
+    t, q, dq = motion(2)
+    wide = q * [1.0, 10.0]
+    new(table(tmp_path / "run.csv", t, wide, dq * [1.0, 10.0], effort(q, dq)))
+    moderate, may_be_degrees = (joint.limits for joint in robots.load("robot.toml", tmp_path).joints)
+    low, high = q[:, 0].min(), q[:, 0].max()
+    assert moderate.q == pytest.approx((low, high), abs=0.1 * max(-low, high))
+    assert moderate.q[0] <= low + 0.01
+    assert moderate.q[1] >= high - 0.01
+    assert moderate.dq[1] == -moderate.dq[0] == pytest.approx(np.abs(dq[:, 0]).max(), rel=0.1)
+    assert not np.isfinite([*may_be_degrees.q, *may_be_degrees.dq]).any()
+
+
+def test_a_robot_file_outside_the_study_is_refused_at_once(tmp_path):
+    t, q, dq = motion(2)
+    file = table(tmp_path / "mine" / "run.csv", t, q, dq, effort(q, dq))
+    new(table(tmp_path / "other" / "run.csv", t, q, dq, effort(q, dq)))
+    for robot in ("../other/robot.toml", "robot.toml"):
+        says = call("new", file, "--robot", robot, code=1)
+        assert f"--robot {robot}: copy that file into {file.parent}, beside study.toml" in says
+    assert [path.name for path in file.parent.iterdir()] == ["run.csv"]
 
 
 def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):

@@ -378,6 +378,17 @@ def test_no_page_loses_a_word_on_a_narrow_terminal(monkeypatch, capsys):
         assert shown.count("…") == page.text.count("…"), page.topic
 
 
+def test_no_line_of_code_is_broken_on_a_narrow_terminal(monkeypatch, capsys):
+    """A broken comment would be code."""
+    monkeypatch.setenv("COLUMNS", "80")
+    for page in guide.pages():
+        show_markdown(page.as_text)
+        shown = {line.rstrip() for line in capsys.readouterr().out.splitlines()}
+        code = "".join(re.findall(r"^```\w*\n(.*?)^```", page.as_text, re.M | re.DOTALL))
+        assert {line.rstrip() for line in code.splitlines()} <= shown, page.topic
+    assert max(map(len, PAGES["python"].partition("```python\n")[2].partition("```")[0].splitlines())) <= 80
+
+
 def test_the_readme_is_two_screens_to_the_first_result_and_not_much_more():
     assert len(README.splitlines()) <= 130
     assert len(README.split()) <= 1000

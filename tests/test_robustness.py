@@ -214,7 +214,7 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
     def refuse(files, options):
         raise PermissionError(13, "Permission denied", str(files[0]))
 
-    monkeypatch.setattr("davinci_forces.runner.execution.open_parts", refuse)
+    monkeypatch.setattr("davinci_forces.logs.parts.open_parts", refuse)
     said = flat(call("ingest", small(raw / "lab"), code=1))
     assert "Permission denied" in said
     assert "fault of davinci-forces" not in said

@@ -9,6 +9,7 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -19,7 +20,8 @@ import davinci_forces
 from davinci_forces.cli import app
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.estimators import ESTIMATORS
-from davinci_forces.runner import ledger, reporting
+from davinci_forces.runner import ledger, reporting, runner, runs
+from davinci_forces.runner.console import console
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import stage_of
@@ -171,6 +173,31 @@ def test_a_changed_sample_runs_what_depends_on_it_and_nothing_else(finished):
     said = call("ingest", finished)
     assert "ingest: slide: raw/slide.csv changed" in said
     assert "ingest: 3 of 4 up to date" in said
+
+
+def test_many_reasons_of_one_step_are_one_line_with_the_first():
+    few = {f"raw/{i}.csv changed": [f"log-{i}"] for i in range(runner.MAX_REASONS)}
+    assert runner._grouped(few) == few
+    many = few | {"raw/x.csv changed": ["log-x", "log-y"]}
+    assert runner._grouped(many) == {
+        "raw/0.csv changed; 3 more such reasons": ["log-0", "log-1", "log-2", "log-x", "log-y"]
+    }
+
+
+def test_several_warnings_of_a_run_are_printed_once_more_at_its_end(capsys):
+    warnings = [f"ingest: warning: {i}" for i in range(runs.MAX_REPEATED + 2)]
+    made = SimpleNamespace(warnings=warnings, console=console("normal"), ran=1, seconds={}, folders=None)
+    made.ledger = SimpleNamespace(entry=lambda *_: None)
+    runs.print_results(made, Path("raw/a"))
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        f"the {len(warnings)} warnings of this run once more:",
+        *(f"  {line}" for line in warnings[: runs.MAX_REPEATED]),
+        "  and 2 more, above",
+    ]
+    made.warnings = warnings[:1]
+    runs.print_results(made, Path("raw/a"))
+    assert not capsys.readouterr().err
 
 
 def test_an_altered_processed_file_is_made_again(finished):

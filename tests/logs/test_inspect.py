@@ -82,7 +82,7 @@ def test_a_log_without_a_clock_says_what_may_be_one(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("".join(f"{0.5 * i + 7},{(-1) ** i}\n" for i in range(20)))
     text = shown(path)
-    assert "add rate = ... [Hz] for this log in study.toml" in text
+    assert "unless study.toml names a channel of times, add rate = ... [Hz] there" in text
     assert "or time = 'column_0', which increases throughout (2 Hz" in text
 
 

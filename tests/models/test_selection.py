@@ -169,3 +169,18 @@ def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():
 
 def test_fits_of_different_efforts_make_one_candidate_of_their_mean_error():
     assert combine_efforts([worth(0.1), worth(0.3)]).score == pytest.approx(0.2)
+
+
+def test_a_refit_that_does_not_excite_a_base_parameter_has_no_score():
+    """Two cells; the second of two parameters is excited in the second cell alone, or also in some of the first."""
+    ridge = Ridge(1e-4, np.ones(1), np.eye(2))
+    for in_first, enough in ((0, False), (20, True)):
+        Phi = np.random.default_rng(0).normal(size=(400, 1, 2))
+        Phi[: 200 - in_first, 0, 1] *= 1e-12
+        cells = sum_equations(Phi, Phi @ [1.0, 1.0], np.repeat([0, 1], 200), 2)
+        part = SimpleNamespace(
+            model=None, library=SimpleNamespace(logs=()), by_block=cells, by_period=cells, ridge=ridge
+        )
+        refits = RefitModel(part, 1)
+        assert refits.excites_all(cells, np.array([False, True])) == enough
+        assert refits.excites_all(cells, np.array([True, False]))

@@ -276,3 +276,12 @@ def test_a_trend_through_values_that_scatter_is_that_of_statsmodels():
 def test_holm_stops_at_the_first_test_that_does_not_tell():
     assert holm([0.04, 0.001, 0.02, 0.3], 0.05).tolist() == [False, True, False, False]
     assert holm([0.01, 0.012, 0.02, 0.03], 0.05).tolist() == [True, True, True, True]
+
+
+def test_holm_s_tests_are_those_of_statsmodels():
+    from statsmodels.stats.multitest import multipletests
+
+    random = np.random.default_rng(3)
+    for n in (1, 2, 9):
+        p = random.uniform(size=n) ** 4
+        assert holm(p, 0.05).tolist() == multipletests(p, 0.05, method="holm")[0].tolist()

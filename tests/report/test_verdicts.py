@@ -9,6 +9,7 @@ from report_records import free_space, prediction, stiffness, weight
 from davinci_forces.maths.periods.shift import SAME_PATH
 from davinci_forces.records import PathShare
 from davinci_forces.report import verdicts
+from davinci_forces.report.context import name_in_sentence
 from davinci_forces.report.sections.summary.opening import verdict_sentence
 from davinci_forces.report.verdicts import (
     Trust,
@@ -201,6 +202,13 @@ def test_the_table_of_thresholds_says_what_the_verdicts_do():
     said = " ".join(str(cell) for row in thresholds() for cell in row)
     for threshold in ("10 %", "25 %", "33 %", "100 %", "90 % to 98 %"):
         assert threshold in said
+
+
+def test_a_numbered_joint_has_no_article_in_a_sentence():
+    assert name_in_sentence("hand_roll") == "the hand roll"
+    assert name_in_sentence("joint_1") == "joint 1"
+    narrow = [replace(trust(error=0.5), joint=name, space=free_space(coverage=0.3)) for name in ("pan", "lift")]
+    assert "the 95 % band is too narrow on the pan and lift" in verdict_sentence(None, narrow)
 
 
 def test_bands_are_not_called_right_where_none_was_judged():

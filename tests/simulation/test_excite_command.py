@@ -112,6 +112,14 @@ def test_how_far_the_starts_of_a_search_agree_is_said(laboratory):
     assert "starts" not in json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--json"))
 
 
+def test_each_start_of_a_search_is_reported_with_the_time_to_go(laboratory):
+    result = CliRunner().invoke(app, [laboratory, "shoulder", "--starts", "2", "--json"])
+    first, second = result.stderr.splitlines()
+    assert first.startswith("start 1 of 2: objective -")
+    assert second.endswith("about 0 s to go")
+    assert json.loads(result.stdout)["starts"]["number"] == 2
+
+
 ARM = """
 name = "arm"
 [[joint]]
@@ -216,6 +224,28 @@ def test_a_joint_that_turns_without_limits_is_excited_within_one_turn(tmp_path):
     (tmp_path / "arm.toml").write_text(ARM.replace("q = [-1.0, 1.0], ", ""))
     found = json.loads(call(str(tmp_path / "arm.toml"), "shoulder", "--starts", "1", "--json"))
     assert found["limits"]["q"] == pytest.approx([-np.pi, np.pi])
+
+
+def test_a_joint_without_limits_is_not_excited(tmp_path):
+    (tmp_path / "arm.toml").write_text(
+        ARM.replace("limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }", "")
+    )
+    shoulder = (str(tmp_path / "arm.toml"), "shoulder")
+    with pytest.raises(BadRequest, match=r"shoulder: no limits of q and dq are stated, .* give --q and --dq"):
+        call(*shoulder)
+    with pytest.raises(BadRequest, match="no limits of dq are stated"):
+        call(*shoulder, "--q", "-1,1")
+    limited = (*shoulder, "--dq", "-1,1", "--starts", "1")
+    assert json.loads(call(*limited, "--json"))["limits"]["ddq"] == [None, None]
+    lines = {line.split()[0]: line for line in call(*limited).splitlines()}
+    assert [name for name in ("q", "dq", "ddq") if "CHECK" in lines[name]] == ["q", "ddq"]
+
+
+def test_a_robot_file_that_is_elsewhere_is_refused_with_the_remedy(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("robot.toml", "robot.urdf"):
+        with pytest.raises(BadRobot, match="run this in the folder of the file, or give its path"):
+            call(name, "shoulder")
 
 
 @pytest.mark.parametrize("noise", ["0", "-1", "1,2", "x"])

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from davinci_forces.report.changes import Change, StatedValue
 
 LARGEST = 10  # changes of a joint that are listed
-ORDER = ("model", "contacts", "forces", "noise", "study")  # of what changes are about
 
 
 def run(
@@ -32,7 +31,10 @@ def run(
         bool, typer.Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")
     ] = False,
 ) -> None:
-    """List what changed from A to B, joint by joint, the largest changes in standard errors first."""
+    """List what changed from A to B, joint by joint: page one first, models that were not chosen last.
+
+    Within a rank, the largest changes in standard errors come first.
+    """
     from davinci_forces.report.changes import changes
     from davinci_forces.runner import runs
     from davinci_forces.runner.results import stated
@@ -66,18 +68,20 @@ def _lines(
     differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"], most: int
 ) -> list[str]:
     """The comparison as lines of text, with at most `most` changes of a joint."""
-    from davinci_forces.report.changes import by_joint
+    from davinci_forces.report.changes import RANKS, by_joint
+
+    def counts(some: list["Change"]) -> str:
+        number = Counter(change.subject for change in some)
+        return ": " + ", ".join(f"{number[about]} of {about}" for about in RANKS if number[about]) if some else ""
 
     changed = [change for change in differing if change.before and change.after]
     shared = [key for key in before if key in after]
-    lines = [f"{len(changed)} of the {len(shared)} shared numbers changed"]
+    lines = [f"{len(changed)} of the {len(shared)} shared numbers changed{counts(changed)}"]
     for joint, group in by_joint(changed, [*before, *after]).items():
-        largest = sorted(group[:most], key=lambda change: ORDER.index(change.subject))
         lines += ["", f"{joint or 'not of one joint'}: {len(group)} changed"]
-        rows = [("", "key", "a", "b", "std", "z"), *map(_cells, largest)]
+        rows = [("", "key", "a", "b", "std", "z"), *map(_cells, group[:most])]
         lines += [f"  {line}" for line in table(rows, right_from=2)]
-        rest = Counter(change.subject for change in group[most:])
-        lines += [f"  and {', '.join(f'{rest[m]} of {m}' for m in ORDER if rest[m])}: --all lists them"] if rest else []
+        lines += [f"  and{counts(group[most:])[1:]}: --all lists them"] if group[most:] else []
     if changed:
         with_error = sum(before[key].std is not None or after[key].std is not None for key in shared)
         lines += [

@@ -1,6 +1,7 @@
 """Design an excitation trajectory that identifies a joint's parameters best, or evaluate a given one."""
 
 import json
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
-    from davinci_forces.maths.excitation.arm import ReportStart
+    from davinci_forces.maths.excitation.search import ReportStart
     from davinci_forces.simulation.excitation.request import Answer, ArmExcitation
     from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory, ExpectedParameter
 
@@ -64,7 +65,7 @@ def run(
     All joints of an arm together keep their position, velocity and acceleration limits, the effort limits if the masses
     are known, and the workspace of `--floor` and `--box`. Efforts are those of weight and inertia, without friction.
     The trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
-    find a better trajectory. An arm takes minutes; a line is printed after each start.
+    find a better trajectory. A line is printed after each start, as the search may take minutes.
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
@@ -128,13 +129,17 @@ def _format_text(answered: "Answer") -> str:
 
 
 def _lines(e: "ExcitationTrajectory") -> list[str]:
+    from davinci_forces.simulation.excitation.request import WHOLE_TURN
+
     facts = e.facts()
     lines = [f"{e.joint.name}: objective {e.objective:.4f}, condition {e.condition:.1f}, period {e.series.period:g} s"]
     lines += [_spread(facts["starts"])] if "starts" in facts else []
     lines += ["  " + "  ".join(f"{name} = {value:.6g}" for name, value in facts["coefficients"].items())]
-    for symbol, (low, high) in facts["ranges"].items():
-        lower, upper = facts["limits"][symbol]
-        lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
+    stated = (e.joint.limits.q, e.joint.limits.dq, e.joint.limits.ddq)
+    for (symbol, (low, high)), limits, of_joint in zip(facts["ranges"].items(), e.problem.limits, stated, strict=True):
+        lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {limits[0]:g} and {limits[1]:g}"]
+        if not all(map(math.isfinite, of_joint)) and limits in (of_joint, WHOLE_TURN):
+            lines[-1] += f": CHECK that the joint may move so, as no limit of {symbol} is stated; --{symbol} sets one"
     return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations] + _error_lines(e.standard_errors)
 
 

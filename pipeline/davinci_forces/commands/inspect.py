@@ -117,7 +117,9 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
         from davinci_forces.study.guessing import clock_hint
 
         hint = clock_hint(log.independent_copy())
-        advice = "none: add rate = ... [Hz] for this log in study.toml" + (f", or {hint}" if hint else "")
+        advice = "none: unless study.toml names a channel of times, add rate = ... [Hz] there" + (
+            f", or {hint}" if hint else ""
+        )
         return {"source": advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",

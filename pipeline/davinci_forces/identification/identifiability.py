@@ -56,9 +56,10 @@ def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
 
 
 def excite_command(robot: Robot, joint: Joint) -> str:
-    """Return the command that designs a motion of a joint; an unlisted robot has a file in the study's folder."""
-    name = robot.file or (robot.name if robot.name in ROBOTS else f"{robot.name}.toml")
-    return f"`davinci-forces excite {name} {joint.name}`"
+    """Return the command that designs a motion of a joint, and where to run it if the robot is a file."""
+    listed = robot.name in ROBOTS and not robot.file
+    name = robot.name if listed else robot.file or f"{robot.name}.toml"
+    return f"`davinci-forces excite {name} {joint.name}`" + ("" if listed else " in the study's folder")
 
 
 def why_not_positive(

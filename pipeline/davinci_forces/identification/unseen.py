@@ -14,8 +14,8 @@ from davinci_forces.identification.observations import Observed, is_evaluated
 from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, solve
-from davinci_forces.records import Prediction
+from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, excited_parameters, solve, sum_all
+from davinci_forces.records import Diagnostic, Prediction, diagnostic
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, CHOSEN_BY_LOG, SAME_PATH
 
 
@@ -37,6 +37,10 @@ class RefitModel:
         self.by_block, self.by_period = part.by_block, part.by_period
         self._ridge, self._thetas = part.ridge, dict[bytes, Array]()
 
+    def excites_all(self, cells: Equations, out: Booleans) -> bool:
+        """Whether the cells of a refit excite every base parameter that all cells excite."""
+        return excited_parameters(cells.sum_cells(~out), self._ridge) == excited_parameters(sum_all(cells), self._ridge)
+
     def theta(self, cells: Equations, out: Booleans) -> Array:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
         key = out.tobytes()
@@ -45,7 +49,7 @@ class RefitModel:
         return self._thetas[key]
 
 
-def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed]) -> Iterator[Prediction]:
+def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed]) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of each joint of all logs by refits of a candidate, by the scheme of the joints' own fits.
 
     The chosen candidate is refitted without blocks of path, as `chosen`, and without whole logs if it has several, as
@@ -68,8 +72,13 @@ def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed])
 
 def predict_scheme(
     scheme: Scheme, refits: RefitModel, log: Observed, name: str, estimator: str
-) -> Iterator[Prediction]:
+) -> Iterator[Prediction | Diagnostic]:
     """Predict the efforts of a model in a log, each sample out of sample, and score the moving samples."""
+    if not all(refits.excites_all(scheme.cells, out) for out in scheme.out):
+        text = f"{log.records[0].log}: {name}, {estimator} has no leave-out score of {', '.join(refits.model.efforts)}"
+        why = "the data that are not left out excite fewer of its parameters"
+        yield diagnostic("choose", "arm", "note", f"{text}, because {why}")
+        return
     try:
         thetas = np.array([refits.theta(scheme.cells, out) for out in scheme.out])
     except np.linalg.LinAlgError:

@@ -132,11 +132,25 @@ def penalty(G: Array, combination: Array) -> Array:
     """Penalty P (p, p): the square of each parameter's column; for base parameters, that of the smallest pi."""
     P, b = np.diag(np.diag(G)), len(combination)
     if b:
-        D = ((G[:b, :b] @ combination) * combination).sum(axis=0)
+        D = size_of_links(G, combination)
         excited = UNSEEN * D.max() < D
         K = combination[:, excited]
         P[:b, :b] = np.linalg.inv((K / D[excited]) @ K.T)
     return P
+
+
+def size_of_links(G: Array, combination: Array) -> Array:
+    """Squared lengths D (10 L + ...) of the columns of the parameters pi that base parameters combine."""
+    b = len(combination)
+    return np.asarray(((G[:b, :b] @ combination) * combination).sum(axis=0))
+
+
+def excited_parameters(equations: Equations, ridge: Ridge) -> int:
+    """The number of base parameters that the data of one cell excite; without them the penalty does not exist."""
+    if not len(ridge.combination):
+        return 0
+    D = size_of_links(np.einsum("m,mpq->pq", ridge.weights, equations.gram[0]), ridge.combination)
+    return int(np.linalg.matrix_rank(ridge.combination[:, UNSEEN * D.max() < D]))
 
 
 def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Integers:

@@ -4,13 +4,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-SUBJECTS = {  # what a key is about, by its first part; other keys are of the study
+SUBJECTS = {  # what a key is about, by its first part; other keys are of the study, see `Change.subject`
     "model": ("fit", "choice", "cv", "predict", "path", "search", "guess", "identifiability", "correlation", "truth"),
     "contacts": ("contact", "tissue", "weight"),
-    "forces": ("effort", "tip", "ekf", "threshold", "tuning", "direct", "momentum", "rate", "rts", "stability",
-               "haptics"),
+    "forces": ("effort", "tip", "ekf", "threshold", "tuning", "direct", "momentum", "rate", "rts", "stream",
+               "stability", "haptics"),
     "noise": ("noise", "whiteness", "band", "period", "log"),
 }  # fmt: skip
+PAGE_ONE = ("model_error", "detection_level", "coverage")  # last parts of its keys
+OF_CANDIDATES = ("fit", "choice", "cv", "predict", "search", "guess", "identifiability", "correlation")
+RANKS = {"page one": 0, "model": 1, "contacts": 1, "forces": 2, "noise": 2, "study": 2, "candidates": 3}  # to sort by
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
 
@@ -55,9 +58,20 @@ class Change:
 
     @property
     def subject(self) -> str:
-        """What the number is about: a key of SUBJECTS, or "study"."""
-        start = self.key.split(".")[0].partition("-")[0]  # ekf-euler is an ekf
+        """What the number is about, of RANKS; "candidates" are models and estimators that were not chosen."""
+        start, *others = self.key.split(".")
+        is_chosen = "chosen" in others
+        if start in OF_CANDIDATES and not is_chosen:
+            return "candidates"
+        if others[-1:] and others[-1] in PAGE_ONE and (is_chosen or start == "effort"):
+            return "page one"
+        start = start.partition("-")[0]  # ekf-euler is an ekf
         return next((subject for subject, starts in SUBJECTS.items() if start in starts), "study")
+
+    @property
+    def weight(self) -> tuple[int, bool, float]:
+        """A weight to sort by: the rank, then standard errors, then relative differences, then other changes."""
+        return -RANKS[self.subject], *self.size
 
     @property
     def size(self) -> tuple[bool, float]:
@@ -78,10 +92,10 @@ def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue])
 
 
 def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:
-    """Changes by the joint that their keys name, "" for none, the largest first; `keys` are all keys of a study."""
+    """Changes by the joint that their keys name, "" for none, the weightiest first; `keys` are all keys of a study."""
     joints = {key.split(".")[1]: None for key in keys if key.startswith(("fit.", "threshold."))}
     groups: dict[str, list[Change]] = {}
-    for change in sorted(differing, key=lambda change: change.size, reverse=True):
+    for change in sorted(differing, key=lambda change: change.weight, reverse=True):
         joint = next((part for part in change.key.split(".")[1:] if part in joints), "")
         groups.setdefault(joint, []).append(change)
     return {joint: groups[joint] for joint in (*joints, "") if joint in groups}

@@ -1,5 +1,6 @@
 """The input of every section: records, results, and the names of fits, logs and axes."""
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -135,6 +136,12 @@ def title(name: str) -> str:
     """The name of a log or joint as a heading: 'hand_roll' is 'Hand roll'."""
     text = literal(name.replace("_", " "))
     return text[:1].upper() + text[1:]
+
+
+def name_in_sentence(joint: str) -> str:
+    """The name of a joint within a sentence: `the hand roll`, but `joint 1`."""
+    article = "" if re.match(r"joint[_-]?\d", joint) else "the "
+    return article + literal(joint.replace("_", " "))
 
 
 def label(record: Record, field: str, meaning: str = "") -> str:

@@ -22,6 +22,10 @@ def load(name: str, folder: Path) -> Robot:
     BadRobot
         If there is no such robot or file, or the file has problems; the message lists each with its line.
     """
+    if name.endswith(FILES) and not (folder / name).exists():
+        raise BadRobot(
+            f"{folder / name}: there is no such robot file; run this in the folder of the file, or give its path"
+        )
     robot, file = read_with_problems(name, folder)
     if file:
         file.refuse(BadRobot)

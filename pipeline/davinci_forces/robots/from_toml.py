@@ -123,6 +123,8 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         ),
         q_tau=table.number("q_tau", joint.q_tau, low=0.0, expected="a number from 0 on"),
     )
+    if changed.title.lower() not in (joint.title.lower(), joint.name.replace("_", " ")):
+        table.problem("title is not shown: reports name a joint by its name; change that, or leave title out", "title")
     if changed.effort != joint.effort and "limits" not in table:  # the effort limit is in the old unit
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
     if "effort" in table and "torque_constant" in table:

@@ -92,9 +92,10 @@ def table(rows: Sequence[Sequence[str]], right_from: int = sys.maxsize) -> Itera
 
 
 def show_markdown(text: str) -> None:
-    """Print Markdown, laid out for the width of the terminal; a pipe gets the same without colours."""
+    """Print Markdown, laid out for the width of the terminal, with code as it is; a pipe gets it without colours."""
     from rich.console import Console as Terminal
-    from rich.markdown import Markdown, TableElement
+    from rich.markdown import CodeBlock, Markdown, TableElement
+    from rich.syntax import Syntax
 
     class Folded(TableElement):
         """A table that is too wide breaks its words instead of cutting them."""
@@ -105,7 +106,15 @@ def show_markdown(text: str) -> None:
                     column.overflow = "fold"
                 yield table
 
-    class Page(Markdown):
-        elements: ClassVar = Markdown.elements | {"table_open": Folded}
+    class Whole(CodeBlock):
+        """Code whose lines are not broken, as a broken comment would be code."""
 
-    Terminal().print(Page(visible(text, "\n\t")))
+        def __rich_console__(self, *about: Any) -> Iterator[Any]:
+            code = Syntax("", self.lexer_name, theme=self.theme).highlight(str(self.text).rstrip())
+            code.no_wrap, code.overflow = True, "ignore"
+            yield code
+
+    class Page(Markdown):
+        elements: ClassVar = Markdown.elements | {"table_open": Folded, "fence": Whole, "code_block": Whole}
+
+    Terminal().print(Page(visible(text, "\n\t")), crop=False)

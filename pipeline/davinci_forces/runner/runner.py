@@ -22,6 +22,8 @@ from davinci_forces.runner.processes.workers import TaskQueue, WorkerPool
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
 
+MAX_REASONS = 3  # of the tasks of a step that are printed one by one
+
 
 @dataclass
 class Progress:
@@ -47,6 +49,7 @@ class Runner:
     def __post_init__(self) -> None:
         self.ledger = Ledger(self.folders)
         self.failures = 0
+        self.warnings: list[str] = []
         self.ran = 0
         self.seconds: dict[str, float] = {}  # total time of the tasks, by stage
         self.writable = True
@@ -167,7 +170,7 @@ class Runner:
         due = {part: self._plan_part(part) if _has_tasks(part) else [] for part in batch}
         progress = self._progress[step]
         if not progress.unplanned:
-            for reason, names in progress.reasons.items():
+            for reason, names in _grouped(progress.reasons).items():
                 self.console.say(f"{_listed(stage_of(step), names)}: {reason}")
             progress.reasons.clear()
         function = (
@@ -247,7 +250,8 @@ class Runner:
         self.failures += bool(outcome.failed)
         self.seconds[stage] += outcome.seconds
         for line in outcome.messages:
-            self.console.warn(f"{stage}: {line}")
+            self.warnings.append(f"{stage}: {line}")
+            self.console.warn(self.warnings[-1])
         self.console.progress(stage, *self._crew.counts)
 
 
@@ -269,6 +273,16 @@ def _folder(name: str) -> str:
 
 def _brief(reasons: list[str]) -> str:
     return "; ".join(reasons[:2]) + (f"; and {len(reasons) - 2} more" if len(reasons) > 2 else "")
+
+
+def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Reasons with their tasks; many reasons become one, which states the first."""
+    if len(reasons) <= MAX_REASONS:
+        return reasons
+    others = len(reasons) - 1
+    return {
+        f"{next(iter(reasons))}; {others} more such reasons": [name for names in reasons.values() for name in names]
+    }
 
 
 def _listed(stage: str, tasks: list[str]) -> str:

@@ -16,6 +16,8 @@ from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.signature import stage_of
 from davinci_forces.study import Study, reading
 
+MAX_REPEATED = 10  # warnings that are printed once more at the end of a run
+
 
 def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
     """The folders of a study; by default, processed/ and reports/ are next to the folder that contains the study."""
@@ -184,6 +186,12 @@ def print_results(runner: Runner, folder: Path) -> None:
         runner.console.say(text_of(read_bytes(runner.folders.reports / "summary.txt")).rstrip())
     if runner.ran:
         runner.console.say(durations(runner.seconds))
+    if len(runner.warnings) > 1:
+        runner.console.warn(f"the {len(runner.warnings)} warnings of this run once more:")
+        for line in runner.warnings[:MAX_REPEATED]:
+            runner.console.warn(f"  {line}")
+        if len(runner.warnings) > MAX_REPEATED:
+            runner.console.warn(f"  and {len(runner.warnings) - MAX_REPEATED} more, above")
     for file in ("report.html", "report.pdf", "robot.html", "results.json"):
         if f"reports/{file}" in files:
             runner.console.say(f"{folder}: see {runner.folders.reports / file}")

@@ -3,17 +3,21 @@
 The robot follows from the number of joints and the ranges of their positions; a robot.toml is written if none fits.
 """
 
+import math
 import re
 import tomllib
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from davinci_forces import robots
 from davinci_forces.errors import BadRobot
 from davinci_forces.logs.joined import Joined
+from davinci_forces.maths.contact.unexplained import Course
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
@@ -31,6 +35,7 @@ MAX_SLIDE = 0.3  # [m] within which the instrument slides
 MAX_TURN = 1.6  # [rad] within which the hand turns
 DAVINCI_WORDS = ("davinci", "dvrk", "psm")
 OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
+MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way; a drive that turns farther may be in degrees
 HARMONICS = 12  # more than an excitation usually has: too few distort the motion, too many keep a little noise
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
 OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
@@ -83,11 +88,12 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
         return Arm(name, robot, f"CHECK: by {by_name}a third joint that slides, and logs of {efforts}{count}")
     name = ROBOT_FILE if not (folder / ROBOT_FILE).exists() else f"robot-of-{n}.toml"
     largest = max(counted, key=lambda holding: holding.joints)
-    text = robot_text(_joint_names(largest), current, _prismatic(counted))
+    text = robot_text(_joint_names(largest), current, _prismatic(counted), _limits(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
+    joints = "joint" if n == 1 else f"{n} joints"
     return Arm(
-        name, new_robot, f"written for the {n} joints of the logs, as no shipped robot fits; --robot names one", text
+        name, new_robot, f"written for the {joints} of the logs, as no shipped robot fits; --robot names one", text
     )
 
 
@@ -127,7 +133,34 @@ def _prismatic(holdings: Sequence[Holding]) -> set[int]:
     }
 
 
-def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int] = ()) -> str:
+def _limits(holdings: Sequence[Holding]) -> dict[int, str]:
+    """The ranges of position and velocity of the joints that move, rounded outwards, as values of TOML.
+
+    An angle that may be in degrees, or is the motor's, has none.
+    """
+    courses: dict[int, list[Course]] = {}
+    for holding in holdings:
+        at_motor = {meaning.joint for meaning in holding.meanings.values() if meaning.symbol == "theta_m"}
+        for joint, course in holding.courses.items():
+            if holding.timing.step and joint not in at_motor:
+                courses.setdefault(joint, []).append(course)
+    limits = {}
+    for joint, parts in courses.items():
+        low = _rounded(min(float(part.q.min()) for part in parts), math.floor)
+        high = _rounded(max(float(part.q.max()) for part in parts), math.ceil)
+        dq = _rounded(max(float(np.abs(part.dq).max()) for part in parts), math.ceil)
+        if max(-low, high) <= MAX_ANGLE_DRIVE and low < high and dq:
+            limits[joint] = f"{{ q = [{low:.3g}, {high:.3g}], dq = [{-dq:.3g}, {dq:.3g}] }}"
+    return limits
+
+
+def _rounded(value: float, towards: Callable[[float], int]) -> float:
+    """A value to two digits; 0 stays 0."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1) if value else 1.0
+    return towards(value / unit) * unit
+
+
+def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int], limits: Mapping[int, str]) -> str:
     """Write the text of a robot of which the logs tell the joints and whether they slide."""
     lines = ['name = "robot"', f'title = "Arm of {len(names)} joint{"s" if len(names) > 1 else ""}"']
     for k, name in enumerate(names):
@@ -140,8 +173,14 @@ def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int] =
             f"terms = [{', '.join(f'{chr(34)}{term}{chr(34)}' for term in TERMS)}]",
             f"harmonics = {HARMONICS}  # that the excitation has at most",
         ]
+        if k in limits:
+            lines.append(f"limits = {limits[k]}  # what the logs reach, for `excite`: CHECK")
         if current:
-            lines.append('effort = "A"  # a current; if its constant is known, torque_constant = ... [N m/A]')
+            lines += [
+                'effort = "A"  # a current; if the drive is known, replace this line by these two:',
+                "# torque_constant = 0.05  # [N m/A] at the motor, or [N/A]",
+                "# gear_ratio = 100.0  # motor angle over joint position",
+            ]
     return "\n".join(lines) + "\n"
 
 

@@ -113,7 +113,7 @@ def _robot(table: TomlTable, folder: Path) -> Robot | None:
     if name is None:
         return None
     if not is_inside(name):
-        table.problem(f"robot {name!r} lies outside the study", "robot")
+        table.problem(f"robot {name!r} lies outside the study; copy that file beside study.toml", "robot")
         return None
     try:
         robot, file = robots.read_with_problems(name, folder)

@@ -17,16 +17,23 @@ from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.tissue.palpation import touches_at_once
 from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.study.belonging import Arm, arm_of, candidates, group_recordings, guess_joined, split_signal
+from davinci_forces.study.belonging import (
+    MAX_ANGLE_DRIVE,
+    Arm,
+    arm_of,
+    candidates,
+    group_recordings,
+    guess_joined,
+    split_signal,
+)
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, is_tissue, tissue_channels, unit_of
-from davinci_forces.study.entries import ROLES
+from davinci_forces.study.entries import ROLES, is_inside
 from davinci_forces.study.guessing import Holding, Meaning, guess
 from davinci_forces.study.names import is_time, stated_unit
 from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
-MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way, as drives with limits turn; larger may be degrees
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
 
@@ -89,7 +96,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     Raises
     ------
     BadRequest
-        If a log lies outside the study's folder, or there is none.
+        If a log or the robot's file lies outside the study's folder, or there is no log.
     BadLog
         If no log can be read, with the reason for each.
     BadRobot
@@ -100,6 +107,10 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
             raise BadRequest(f"{file} lies outside {folder}; copy it there first, as a study holds its own logs")
     if not files:
         raise BadRequest(f"{folder} holds no logs")
+    if robot_name.endswith(robots.FILES) and not (is_inside(robot_name) and (folder / robot_name).exists()):
+        raise BadRequest(
+            f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
+        )
     arms = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else candidates(folder)
     drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
     if not drawn:
@@ -188,10 +199,15 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf") and any("i" in draft.guess.symbols() for draft in drawn):
-        for joint in robot.joints:  # a URDF has no torque constants
-            yield ""
-            yield f"[robot_overrides.{joint.name}]"
-            yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
+        yield from _in_amperes(robot)
+
+
+def _in_amperes(robot: Robot) -> Iterator[str]:
+    """Lines that make currents the effort of joints, as a URDF has no torque constants."""
+    for joint in robot.joints:
+        yield ""
+        yield f"[robot_overrides.{joint.name}]"
+        yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
@@ -354,7 +370,8 @@ class _Writer:
             note = f"MISSING: the unit is deg{rate} or rad{rate}; the angle exceeds a turn if it is in rad"
         line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
-            return f"# {line}  # the joint does not move"
+            effect = "; without it, no model of the whole arm is fitted to this log" if self.robot.chain else ""
+            return f"# {line}  # the joint does not move{effect}"
         return f"{line}  # {meaning.reason}; {note}"
 
 

@@ -31,6 +31,7 @@ from davinci_forces.maths.excitation.joint import (
     shrink_into_limits,
 )
 from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_into_arm_limits
+from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
@@ -46,7 +47,6 @@ EXPLORATION, SELECTION = 2, 3  # stages before the best trajectories are chosen
 LBFGS_ITERATIONS = 60  # of L-BFGS in each stage
 STEP = 1e-6  # of the differences, relative to 1 rad or m: their error is 1e-10
 HUGE = 1e10  # of a motion without full rank
-ReportStart = Callable[[int, int, float], None]  # takes the number of a start, from 1, of all starts, and the optimum
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, PERIOD_SAMPLES, Fourier, Range, basis, instants, ranges
-from davinci_forces.maths.excitation.search import minimise
+from davinci_forces.maths.excitation.search import ReportStart, minimise
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
@@ -65,8 +65,8 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
     return ""
 
 
-def design(problem: ExcitationProblem, starts: int, seed: int) -> Design:
-    """Design the trajectory of the best of several starts of the search.  (6.27)
+def design(problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None) -> Design:
+    """Design the trajectory of the best of several starts of the search; `report_start` reports each.  (6.27)
 
     Raises
     ------
@@ -81,7 +81,7 @@ def design(problem: ExcitationProblem, starts: int, seed: int) -> Design:
         x = trajectories(problem, z)
         return CRITERIA[problem.criterion](regressor(problem.terms, *(x @ B for B in bases)))
 
-    best, values = minimise(objective, 1 + 2 * problem.harmonics, starts, seed)
+    best, values = minimise(objective, 1 + 2 * problem.harmonics, starts, seed, report_start)
     if not np.isfinite(values).any():
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")

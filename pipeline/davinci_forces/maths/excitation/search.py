@@ -12,20 +12,32 @@ from davinci_forces.maths.arrays import Array
 
 POPULATION = 5  # candidates for each dimension
 GENERATIONS = 24  # for each dimension
+# Size of an array that is allocated and freed before the search.  From then on, glibc keeps freed memory of that size;
+# otherwise it returns the memory of all trajectories at every step, which takes half of the time.
+RETAINED = 2**21
 COLLAPSED = 1e-6  # a population is spread again if the range of its objective is below this
 SPREAD = (1e-6, 0.1)  # smallest and largest step of that spread, drawn log-uniformly
 STEP_FACTORS = (0.5, 1.0)  # range of the factor of a difference between two candidates
 CROSSING = 0.9  # share of the variables that a step changes
 
 Objective = Callable[[Array], Array]  # the objective (S,) of S candidates (S, d)
+ReportStart = Callable[[int, int, float], None]  # takes the number of a start, from 1, of all starts, and the optimum
 
 
-def minimise(objective: Objective, d: int, starts: int, seed: int) -> tuple[Array, Array]:
+def minimise(
+    objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart | None = None
+) -> tuple[Array, Array]:
     """Minimise from several starts: the best candidate (d,), and the lowest value of each start (starts,).
 
-    The first starts are the same for any number of starts.
+    The first starts are the same for any number of starts.  `report_start` takes the number of a start, from 1, the
+    number of starts, and the optimum.
     """
-    optima = [descend(objective, d, np.random.default_rng([seed, start])) for start in range(starts)]
+    np.empty(RETAINED)
+    optima = []
+    for start in range(starts):
+        optima.append(descend(objective, d, np.random.default_rng([seed, start])))
+        if report_start:
+            report_start(start + 1, starts, optima[-1][1])
     values = np.array([value for _, value in optima])
     return optima[int(values.argmin())][0], values
 

@@ -12,7 +12,6 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.arm import (
     ArmExcitationProblem,
-    ReportStart,
     arm_observation,
     arm_problem,
     design_together,
@@ -21,6 +20,7 @@ from davinci_forces.maths.excitation.arm import (
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
 from davinci_forces.maths.excitation.joint import ExcitationProblem
 from davinci_forces.maths.excitation.limits import ArmLimits, Box, Obstacles
+from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.maths.models.coupled import LINK_UNITS
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.robots.robot import Joint, Kind, Robot
@@ -75,7 +75,7 @@ class Answer(NamedTuple):
 
 
 def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
-    """Design or evaluate a trajectory for each requested joint; `report_start` reports each start for an arm.
+    """Design or evaluate a trajectory for each requested joint; `report_start` reports each start.
 
     Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
     whole arm.  Otherwise the joints' models are independent, and each trajectory is optimal for its own joint.
@@ -106,7 +106,7 @@ def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
         efforts = [joint.limits.effort for joint in joints]
         arm = arm_problem(robot.chain, problems, robot.bodies, efforts, _obstacles(request))
         return _of_arm(request, robot, arm, noise, report_start)
-    return Answer([_excitation(request, *part) for part in zip(joints, problems, noise, strict=True)])
+    return Answer([_excitation(request, *part, report_start) for part in zip(joints, problems, noise, strict=True)])
 
 
 def _of_arm(
@@ -145,14 +145,24 @@ def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem
     problem = problem_of(joint, period, request.harmonics, request.criterion, request.samples)
     options = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
     q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
+    missing = [name for name, pair in (("q", q), ("dq", dq)) if not all(map(math.isfinite, pair))]
     if joint.kind is Kind.REVOLUTE and not any(map(math.isfinite, q)):
         q = WHOLE_TURN
+    if request.evaluate is None and not all(map(math.isfinite, (*q, *dq))):
+        remedy = " and ".join(f"--{name}" for name in missing)
+        raise BadRequest(
+            f"{joint.name}: no limits of {' and '.join(missing)} are stated, so no motion can be known to be safe; add "
+            f"limits to the joint in the robot's file, or give {remedy}, each as lower,upper"
+        )
     return replace(problem, limits=(q, dq, ddq))
 
 
-def _excitation(request: Request, joint: Joint, problem: ExcitationProblem, noise: float) -> ExcitationTrajectory:
+def _excitation(
+    request: Request, joint: Joint, problem: ExcitationProblem, noise: float, report_start: ReportStart | None
+) -> ExcitationTrajectory:
     if request.evaluate is None:
-        return replace(design_excitation(joint, problem, request.starts or STARTS, request.seed), noise=noise)
+        designed = design_excitation(joint, problem, request.starts or STARTS, request.seed, report_start)
+        return replace(designed, noise=noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         names = ",".join(coefficient_names(2))

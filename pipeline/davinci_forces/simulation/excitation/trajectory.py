@@ -14,6 +14,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.maths.excitation.limits import ArmLimits
+from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.robots.robot import Joint, Kind
 from davinci_forces.toml import unlikely
 
@@ -83,7 +84,7 @@ class ExcitationTrajectory:
             "period": self.series.period,
             "samples": self.problem.samples,
             "ranges": {s: list(r) for s, r in zip(symbols, fourier.ranges(self.series), strict=True)},
-            "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
+            "limits": {s: [finite(x) for x in r] for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.violations,
             **({"starts": spread(self.optima)} if self.optima else {}),
             **as_facts(self.standard_errors),
@@ -125,7 +126,9 @@ def problem_of(
     return ExcitationProblem(joint.terms, limits, period, harmonics or joint.harmonics, criterion, samples)
 
 
-def design_excitation(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -> ExcitationTrajectory:
+def design_excitation(
+    joint: Joint, problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
+) -> ExcitationTrajectory:
     """Find the best trajectory of a joint.
 
     Raises
@@ -134,7 +137,7 @@ def design_excitation(joint: Joint, problem: ExcitationProblem, starts: int, see
         If the limits of the joint cannot be kept, or no trajectory separates its parameters.
     """
     try:
-        result = design(problem, starts, seed)
+        result = design(problem, starts, seed, report_start)
         return ExcitationTrajectory(joint, problem, result.series, tuple(result.optima.tolist()))
     except ValueError as error:
         raise BadRequest(f"{joint.name}: {error}") from None

@@ -17,6 +17,7 @@ from davinci_forces.identification.chosen import (
     parameters,
     select_candidate,
 )
+from davinci_forces.identification.identifiability import join_names
 from davinci_forces.identification.observations import Observed, is_evaluated, observe
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
@@ -60,6 +61,8 @@ def run(
     separate, arm = modelled_logs(logs, robot)
     if not separate:
         return
+    if arm:
+        yield from not_of_arm(logs, robot)
     reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
     fixed = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), len(logs))
     if fixed is None:
@@ -122,6 +125,17 @@ def modelled_logs(
                 separate[record.joint].append(log.single_joint(i))
     order = [joint.name for joint in robot.joints if joint.name in separate]
     return {name: tuple(separate[name]) for name in order}, arm
+
+
+def not_of_arm(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
+    """Warn of the logs that the choice of a model of the whole arm leaves out, as they lack joints."""
+    for log in logs:
+        lacking = [joint.name for joint in robot.joints if joint.name not in log.joints]
+        if lacking:
+            first = log.records[0]
+            text = f"{first.log}: no model of the whole arm is fitted to this log, as it lacks {join_names(lacking)}"
+            remedy = f"to fit it, name their channels, on the clock of {first.joint}, also where a joint does not move"
+            yield diagnostic("choose", "arm", "warning", f"{text}; {remedy}")
 
 
 def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:

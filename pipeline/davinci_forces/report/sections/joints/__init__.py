@@ -24,7 +24,7 @@ from davinci_forces.report.content import (
     Verdict,
     literal,
 )
-from davinci_forces.report.context import Context, fit_name, title
+from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
@@ -168,7 +168,7 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     whose = "" if fit.group == joint else " of all joints"
     caption = (
-        f"Parameters of the {literal(joint.replace('_', ' '))}. Model: {fit.model}. Estimator: "
+        f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
         f"Mean squared error of the effort{whose}: {mse}.{coupled}"
     )
@@ -216,7 +216,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
         rows.append((fit_name(fit.model, fit.estimator), *scores, *values))
     group = fits[0].group
     caption = (
-        f"Every fit of the {literal(group.replace('_', ' '))}: mean squared error of the averaged effort, share of its "
+        f"Every fit of {name_in_sentence(group)}: mean squared error of the averaged effort, share of its "
         "variance explained, condition number of the regressor, and the parameters."
     )
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))

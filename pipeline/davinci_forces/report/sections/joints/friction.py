@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.records import FrictionMap
 from davinci_forces.report.content import Figure, Line, Panel, Points
 from davinci_forces.report.content.marks import Colour
-from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.context import Context, label, name_in_sentence, title
 
 MAX_PANELS = 6  # maps in a figure
 BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
@@ -25,7 +25,7 @@ def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
         "gains speed and while it loses speed, and the model's friction. Points are means in bins of "
         "velocity, bars their standard deviations. If the two branches differ, friction depends on the past, or "
         f"changes more slowly than the sign of the velocity.{more}",
-        f"Friction over velocity of the {joint.replace('_', ' ')}: {in_words(shown[0])}",
+        f"Friction over velocity of {name_in_sentence(joint)}: {in_words(shown[0])}",
         tuple(panel(m) for m in shown),
         f"friction-{joint}",
         columns=2 if len(shown) > 1 else 1,

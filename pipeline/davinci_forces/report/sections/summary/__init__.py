@@ -22,13 +22,12 @@ from davinci_forces.report.content import (
     VSpan,
     literal,
 )
-from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary.opening import (
     as_list,
     logs_in_words,
     measurements,
-    name_in_sentence,
     nothing_identified,
     sign_off,
     verdict_sentence,

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.records import Stiffness, Weight
 from davinci_forces.report.content import Prose, Verdict, literal
-from davinci_forces.report.context import Context, count
+from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent, stiffness_level
 from davinci_forces.study.review import STUDY
@@ -37,6 +37,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine])
     narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
+    narrow[1:] = [name.removeprefix("the ") for name in narrow[1:]]
     which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
         parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["all 95 % bands are wide enough"]
@@ -60,12 +61,6 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
         caution = f"so judge {whose} efforts with caution"
         follows = f"but {whose} band is too narrow" if why == "narrow" else why or caution
         yield f"on {path} the model errs by {as_list(joints)}, {follows}"
-
-
-def name_in_sentence(joint: str) -> str:
-    """The name of a joint within a sentence; one that ends in a number is a name without an article."""
-    name = literal(joint.replace("_", " "))
-    return name if joint[-1].isdigit() else f"the {name}"
 
 
 def as_list(parts: Sequence[str]) -> str:
