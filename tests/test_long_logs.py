@@ -2,14 +2,18 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from davinci_forces.filters import FILTERS, filter_parts, tracker
 from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel
+from davinci_forces.identification import joint_models
 from davinci_forces.maths import arrays
-from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Regressor
+from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.uncertainty import error_band
 from davinci_forces.records import JointModel, PeriodResidual, store
 from tests.benchmarks.test_memory import hour_study, peak
@@ -46,6 +50,40 @@ def test_samples_of_a_long_series_are_counted_in_blocks_as_over_the_whole(monkey
     expected = error_band.count_uncorrelated(x)
     monkeypatch.setattr(error_band, "BLOCK_SAMPLES", 256)
     assert error_band.count_uncorrelated(x) == pytest.approx(expected, rel=1e-9)
+
+
+def test_correlations_of_a_long_series_are_those_of_the_whole(monkeypatch):
+    x, u = np.random.default_rng(1).standard_normal((2, N)) + 0.5
+    x[3:] += u[:-3]
+    expected = whiteness.cross_correlation(x, u, 20)
+    monkeypatch.setattr(whiteness, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_allclose(whiteness.cross_correlation(x, u, 20), expected, rtol=0.0, atol=1e-12)
+
+
+class Plane:
+    """A model of one joint with three parameters, none of them of friction with a memory."""
+
+    efforts, displacements = ("roll",), ()
+
+    def regressor(self, motion: ArmMotion) -> Regressor:
+        columns = np.column_stack([motion.q, np.sin(motion.dq), np.sign(motion.dq)])
+        return Regressor(columns[:, None], np.abs(motion.q[:, 0]) > 0.1)
+
+
+def test_a_refit_in_blocks_is_that_of_the_whole(monkeypatch):
+    rng = np.random.default_rng(1)
+    q, dq, ddq = rng.standard_normal((3, N, 1))
+    motion = ArmMotion(q, dq, ddq, 1.0 / RATE, np.zeros(N, np.int64))
+    along: Any = SimpleNamespace(
+        identified=SimpleNamespace(model=lambda fit: Plane()), motion=lambda fit, joint: motion
+    )
+    tau = Plane().regressor(motion).Phi[:, 0] @ np.array([3.0, -2.0, 0.5]) + 0.1 * rng.standard_normal(N)
+    joint: Any = SimpleNamespace(joint="roll", tau=tau, tau_hat=0.5 * tau)
+    free, fit = np.arange(N) % 7 > 0, cast("Any", None)
+    expected = joint_models.refit_effort(joint, fit, along, free)
+    assert np.std(expected - joint.tau_hat) > 0.1
+    monkeypatch.setattr(joint_models, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_allclose(joint_models.refit_effort(joint, fit, along, free), expected, rtol=1e-10, atol=1e-12)
 
 
 def test_a_part_of_a_long_record_is_lazy_and_has_its_rows(tmp_path: Path, monkeypatch):
