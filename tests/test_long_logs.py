@@ -20,7 +20,7 @@ from tests.benchmarks.test_memory import hour_study, peak
 
 RATE, N, BLOCK = 1000.0, 3500, 1000  # the last block is shorter
 NOISE = NoiseModel(1e-4, 1e-3, 0.0, 1e-2, 0.05)
-BYTES = 320  # the most memory that a further sample of a joint takes, in any stage or the report; 90 is the aim
+BYTES = 155  # the most memory that a further sample of a joint takes, in any stage or the report
 
 
 @pytest.fixture
