@@ -15,7 +15,7 @@ import pyarrow.csv
 import pytest
 from pyarrow import parquet
 
-from davinci_forces.records.store import PARTIAL
+from davinci_forces.files import PARTIAL
 from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, edit, processed, reports
 from tests.test_workers import end_within

@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from davinci_forces.records import JointModel, Track, store
 from tests import arm
 from tests.benchmarks.reading import Report
 from tests.benchmarks.test_reading import MB, lvm_file
 from tests.logs.tdms_writer import segment
 
 MOST = 250  # [MB]
+MOST_OF_ALL = 1090  # [MB] an hour of one joint at a kilohertz, from its log to the report
 LIBRARIES = 330  # [MB] what a process takes that has loaded numpy, scipy, pyarrow and numba, and compiled kernels
 TIMES = 1.9  # the numbers of a log, at most
 COLUMNS = 5  # of a signal
@@ -122,6 +124,45 @@ def test_the_stages_of_a_long_log_take_little_more_memory_than_it_does(tmp_path:
     report(f"the stages after them and the report {shown:.0f} MB")
     assert own < LIBRARIES + TIMES * numbers
     assert shown < LIBRARIES + TIMES * numbers
+
+
+def hour_study(home: Path, minutes: int) -> Path:
+    """A study of one joint at a kilohertz: a minute to fit, one to validate, and a contact log of these minutes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    folder, joint = home / "raw" / "lab", "hand_roll"
+    folder.mkdir(parents=True)
+    windows = [[60.0 * i + 4.0, 60.0 * i + 6.0] for i in range(10)]
+
+    def push(t: np.ndarray) -> np.ndarray:
+        return np.where((t % 60.0 > 4.0) & (t % 60.0 < 6.0) & (t < 600.0), 1.0, 0.0)
+
+    tables = []
+    for seed, (name, role, period, seconds, external, more) in enumerate((
+        ("ident", "identification", 10.0, 60, None, "period = 10.0"),
+        ("check", "validation", 13.0, 65, None, ""),
+        ("push", "contact", 13.0, 60 * minutes, push, f"contact = {windows}"),
+    )):  # fmt: skip
+        signal = arm.signal(joint, seed, periods=seconds / period, rate=1000.0, period=period, external=external)
+        columns = {"time": signal.t} | {f"{joint}.{symbol}": getattr(signal, symbol) for symbol in ("q", "dq", "tau")}
+        pq.write_table(pa.table(columns), folder / f"{name}.parquet", row_group_size=1 << 16)
+        tables.append(arm.log_table(name, f"{name}.parquet", role, [joint], more))
+    arm.write_robot(folder)
+    (folder / "study.toml").write_text('robot = "arm.toml"\nsimulated = true\n' + "".join(tables))
+    return folder
+
+
+def test_an_hour_at_a_kilohertz_goes_through_all_stages(tmp_path: Path, full: bool, report: Report):
+    minutes = 60 if full else 10
+    study = hour_study(tmp_path, minutes)
+    own, child = peak("run", study)
+    report(f"{minutes} minutes of one joint at 1 kHz take {own:.0f} MB through all stages, a child {child:.0f} MB")
+    for kind in (JointModel, Track):
+        place = store.path(kind, ("push", "hand_roll"))
+        assert len(store.read(kind, tmp_path / "processed" / "lab", place, longest=1)) == minutes * 60_000
+    assert (tmp_path / "reports" / "lab" / "results.json").exists()
+    assert max(own, child) < MOST_OF_ALL
 
 
 def peak(how: str, what: Path, *stages: str) -> tuple[float, float]:

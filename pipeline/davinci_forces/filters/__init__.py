@@ -1,11 +1,12 @@
-"""Filters that track the external effort: one module each, exporting `track` and `NAME`, listed below."""
+"""Filters that track the external effort: one module each, exporting `blocks`, `track` and `NAME`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 
 import numpy as np
 
-from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, BlockFilter, Filter, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.maths.arrays import BLOCK_SAMPLES
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the other filters are compared with this one
@@ -23,11 +24,41 @@ def title(name: str) -> str:
     return str(import_module(f"davinci_forces.filters.{name}").NAME)
 
 
-def filter_parts(name: str, parts: Sequence[FilterInput], noise: NoiseModel) -> Tracked:
-    """Run a filter over the parts of a recording between gaps; the filter restarts at each part."""
-    track = tracker(name)
-    passes = [track(part, noise) for part in parts]
-    return Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
+def filter_parts(
+    name: str, parts: Sequence[Recording], noise: NoiseModel, names: Sequence[str] = Tracked._fields
+) -> Tracked:
+    """Run a filter over the parts of a recording between gaps; the filter restarts at each part.
+
+    Columns that are not named are empty.
+    """
+    return join_blocks(filter_blocks(name, parts, noise), sum(part.samples for part in parts), names)
+
+
+def filter_blocks(name: str, parts: Sequence[Recording], noise: NoiseModel) -> Iterator[Block]:
+    """Yield the blocks of a filter's pass over the parts of a recording."""
+    blocks: BlockFilter = import_module(f"davinci_forces.filters.{name}").blocks
+    start = 0
+    for part in parts:
+        for rows, tracked in blocks(part, noise):
+            yield slice(start + rows.start, start + rows.stop), tracked
+        start += part.samples
+
+
+def gather_blocks(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Join consecutive blocks to blocks of at least `BLOCK_SAMPLES` samples, but for the last."""
+    pending: list[Block] = []
+    for block in blocks:
+        pending.append(block)
+        if block[0].stop - pending[0][0].start >= BLOCK_SAMPLES:
+            yield _concatenated(pending)
+            pending = []
+    if pending:
+        yield _concatenated(pending)
+
+
+def _concatenated(blocks: Sequence[Block]) -> Block:
+    columns = zip(*(tracked for _, tracked in blocks), strict=True)
+    return slice(blocks[0][0].start, blocks[-1][0].stop), Tracked(*(np.concatenate(column) for column in columns))
 
 
 def diverges(tracked: Tracked) -> bool:

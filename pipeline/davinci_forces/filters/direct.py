@@ -3,17 +3,22 @@
 tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Measured minus model"
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     """Subtract the model's effort; the standard deviation is that of the noise of the effort."""
-    joint, q, dq, ddq, tau, T_s, _ = recording
-    tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
-    zeros = np.zeros(len(q))
-    return Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, zeros, zeros, zeros)
+    for rows, (joint, q, dq, ddq, tau, T_s, _) in input_blocks(recording):
+        tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
+        zeros = np.zeros(len(q))
+        yield rows, Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, zeros, zeros, zeros)
+
+
+track = whole(blocks)

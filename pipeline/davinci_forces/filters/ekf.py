@@ -7,11 +7,12 @@ Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the 
 encoder's noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.filters.sample import Belief
 from davinci_forces.filters.stepping import arguments, correct, covariances, predict, transition
 from davinci_forces.maths.compiled import compile_and_store
@@ -22,11 +23,17 @@ NAME = "Extended Kalman filter"
 LOG_2_PI = float(np.log(2.0 * np.pi))
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    out = np.empty((7, len(recording.q)))
-    _pass(*arguments(recording, noise), *out)
-    return Tracked(*out)
+    s: Any = None
+    for rows, part in input_blocks(recording):
+        out = np.empty((7, part.samples))
+        before, *others = arguments(part, noise)
+        s = _pass(s or before, *others, *out)
+        yield rows, Tracked(*out)
+
+
+track = whole(blocks)
 
 
 def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
@@ -65,13 +72,14 @@ def _pass(
     s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
     out_idq: Any, out_nis: Any,
-) -> None:  # fmt: skip
+) -> Any:  # fmt: skip
     for k in range(len(y_q)):
         s, i_q, i_dq, nis, _ = correct(s, y_q[k], y_dq[k], R_q, R_dq)
         out_q[k], out_dq[k], out_tau[k], out_std[k] = s[0], s[1], s[2], s[8] ** 0.5
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
         q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
+    return s
 
 
 @compile_and_store

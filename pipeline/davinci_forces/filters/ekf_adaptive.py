@@ -6,17 +6,22 @@ R stays between 0.1 and 1000 times the tuned variance, so that the filter does n
 else is as in `ekf`.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
 
 NAME = "Extended Kalman filter, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     """Filter a recording: correct with y_k, then predict with tau_k."""
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)
-    return Tracked(*kalman.run_filter(recording, model))
+    return kalman.run_blocks(recording, model)
+
+
+track = whole(blocks)

@@ -7,12 +7,14 @@ f is the step of the joint's motion (`stepping`).  `ekf` is the same filter for 
 take three quarters of the time.
 """
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from davinci_forces.filters.ekf import LOG_2_PI
-from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, join_blocks
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
 from davinci_forces.filters.stepping import columns, covariances, transition
 from davinci_forces.maths.arrays import Array
@@ -41,10 +43,11 @@ class States(NamedTuple):
     forgets: float = 0.0  # share of the innovations' mean square forgotten per sample, if R adapts; 0: R is fixed
 
 
-def states(recording: FilterInput, noise: NoiseModel, n: int = 3) -> States:
+def states(recording: Recording, noise: NoiseModel, n: int = 3) -> States:
     """Return the states of `ekf`, and n - 3 further states that are 0, constant and not measured."""
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, recording.T_s)
-    x, others = (float(recording.q[0]), float(recording.dq[0]), 0.0), [0.0] * (n - 3)
+    first = recording.part(slice(0, 1))
+    x, others = (float(first.q[0]), float(first.dq[0]), 0.0), [0.0] * (n - 3)
     P = np.diag([INITIAL_VARIANCE_RATIO * R_q, INITIAL_VARIANCE_RATIO * R_dq, recording.initial_std**2, *others])
     Q = np.diag([Q_qq, Q_dd, Q_tau, *others])
     Q[0, 1] = Q[1, 0] = Q_qd
@@ -53,35 +56,51 @@ def states(recording: FilterInput, noise: NoiseModel, n: int = 3) -> States:
 
 def run_filter(recording: FilterInput, model: States) -> Array:
     """Compute the columns of `Tracked` (7, N): correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    out = np.empty((7, len(recording.q)))
-    _run(recording, model, len(recording.q), out)
-    return out
+    return np.array(join_blocks(run_blocks(recording, model), recording.samples))
+
+
+def run_blocks(recording: Recording, model: States) -> Iterator[Block]:
+    """Compute the columns of `Tracked` block by block."""
+    run = _loop(model, recording)
+    for rows, part in input_blocks(recording):
+        out = np.empty((7, part.samples))
+        run(rows.start, recording.samples, out, *columns(part))
+        yield rows, Tracked(*out)
 
 
 def log_likelihood(recording: FilterInput, model: States, transient: int) -> float:
     """Compute the log-likelihood from sample `transient` on: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
-    return _run(recording, model, transient, np.empty((7, len(recording.q))))
+    return float(_loop(model, recording)(0, transient, np.empty((7, recording.samples)), *columns(recording)))
 
 
-def _run(recording: FilterInput, model: States, transient: int, out: Array) -> float:
-    """Run the loop; short recordings get further states of zeros, so that all filters share one compiled loop."""
+def _loop(model: States, recording: Recording) -> Callable[..., Any]:
+    """Return the loop for consecutive blocks of a recording; it keeps the state after each.
+
+    Short recordings get further states of zeros, so that all filters share one compiled loop.
+    """
     x, P, R, Phi, Q, in_q, in_dq, order, doubts, forgets = model
-    zeros = max(MIN_STATES - len(x), 0) if len(recording.q) < MIN_SAMPLES_OWN_LOOP else 0
+    zeros = max(MIN_STATES - len(x), 0) if recording.samples < MIN_SAMPLES_OWN_LOOP else 0
     P, Phi, Q = (np.pad(A, (0, zeros)) for A in (P, Phi, Q))
     if zeros:
         in_q, in_dq = (*in_q, len(x))[:2], (*in_dq, len(x))[:2]
-    noises = (in_q, in_dq, *R.tolist(), Phi, Q, 0.5 * recording.T_s**2 * (order - 1), float(doubts), forgets)
-    return float(_pass(transient, out, (*x, *[0.0] * zeros), P, *noises, *columns(recording)))
+    x, (R_q, R_dq), h = (*x, *[0.0] * zeros), R.tolist(), 0.5 * recording.T_s**2 * (order - 1)
+    adapted = np.array([R_q, R_dq, 0.0, 0.0])
+    return partial(_pass, x, np.array(x), P, adapted, in_q, in_dq, R_q, R_dq, Phi, Q, h, float(doubts), forgets)
 
 
 @compile_and_store
 def _pass(
-    transient: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any,
-    h: float, doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
+    start: Any, state: Any, P: Any, adapted: Any, in_q: Any, in_dq: Any, tuned_q: float, tuned_dq: float, F: Any,
+    Q: Any, h: float, doubts: float, forgets: float, before: int, transient: int, out: Any, y_q: Any, y_dq: Any,
+    drive: Any, inertia: Any, c_b: Any, T_s: float,
 ) -> float:  # fmt: skip
-    """Run the loop.  `start` is a tuple, so that the compiler knows its length n, which is twice as fast."""
-    n, tuned_q, tuned_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0
-    x, B, D, K, G = np.array(start), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, n))
+    """Run the loop over a block after `before` samples; `state`, P and `adapted` change.
+
+    `adapted` is the variances of the measurements and the mean squares of the innovations.  `start` is a tuple of the
+    length n of `state`, so that the compiler knows n, which is twice as fast.
+    """
+    n, R_q, R_dq, C_q, C_dq, total = len(start), adapted[0], adapted[1], adapted[2], adapted[3], 0.0
+    x, B, D, K, G = state.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, n))
     for k in range(len(y_q)):
         i_q, i_dq, s_qq, s_qd, s_dd = y_q[k], y_dq[k], 0.0, 0.0, 0.0
         for i in range(n):  # B = P H'
@@ -95,8 +114,8 @@ def _pass(
             i_q, s_qq, s_qd = i_q - x[i], s_qq + B[i, 0], s_qd + B[i, 1]
         for i in in_dq:
             i_dq, s_dd = i_dq - x[i], s_dd + B[i, 1]
-        if forgets > 0.0 and k > 0:
-            if k == 1:  # the first sample has set the velocity
+        if forgets > 0.0 and before + k > 0:
+            if before + k == 1:  # the first sample has set the velocity
                 C_q, C_dq = s_qq + R_q, s_dd + R_dq
             C_q, C_dq = C_q + forgets * (i_q * i_q - C_q), C_dq + forgets * (i_dq * i_dq - C_dq)
             R_q = min(max(C_q - s_qq, MIN_NOISE_RATIO * tuned_q), MAX_NOISE_RATIO * tuned_q)
@@ -105,7 +124,7 @@ def _pass(
         det = s_qq * s_dd - s_qd * s_qd
         v_qq, v_qd, v_dd = s_dd / det, -s_qd / det, s_qq / det
         nis = i_q * (v_qq * i_q + v_qd * i_dq) + i_dq * (v_qd * i_q + v_dd * i_dq)
-        if k >= transient:
+        if before + k >= transient:
             total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
         # Joseph form, positive for any gain: P - K B' - D K' with D = B - K S
         for i in range(n):
@@ -144,4 +163,6 @@ def _pass(
                     p += F[i, m] * G[j, m]
                 P[i, j], P[j, i] = p, p
         P[1, 1] += friction_var
+    adapted[0], adapted[1], adapted[2], adapted[3] = R_q, R_dq, C_q, C_dq
+    state[:] = x
     return total

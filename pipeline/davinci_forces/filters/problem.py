@@ -1,11 +1,12 @@
 """The input and the output of every filter."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, row_blocks
 from davinci_forces.maths.models.bias import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.signals.smoothing import segments
@@ -26,11 +27,41 @@ class FilterInput(NamedTuple):
     T_s: float
     initial_std: float
 
+    @property
+    def samples(self) -> int:
+        """The number of samples."""
+        return len(self.q)
+
     def part(self, which: slice) -> "FilterInput":
         """Return some of the samples, in their order."""
         joint = self.joint._replace(inertia=self.joint.inertia[which], known=self.joint.known[which])
         q, dq, ddq, tau = (x[which] for x in (self.q, self.dq, self.ddq, self.tau))
         return FilterInput(joint, q, dq, ddq, tau, self.T_s, self.initial_std)
+
+
+class LongInput(NamedTuple):
+    """A recording of many samples, which filters read in parts."""
+
+    samples: int
+    T_s: float
+    initial_std: float
+    part: Callable[[slice], FilterInput]
+
+
+Recording = FilterInput | LongInput
+
+
+def input_blocks(recording: Recording) -> Iterator[tuple[slice, FilterInput]]:
+    """Yield the samples of a recording in blocks."""
+    return ((rows, recording.part(rows)) for rows in row_blocks(recording.samples))
+
+
+def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
+    """Return one column (N,) of a recording."""
+    values = np.empty(recording.samples)
+    for rows, part in input_blocks(recording):
+        values[rows] = of(part)
+    return values
 
 
 def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
@@ -66,25 +97,54 @@ class Tracked(NamedTuple):
 
 
 Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
+Block = tuple[slice, Tracked]  # some samples of a recording, and what a filter made of them
+BlockFilter = Callable[[Recording, NoiseModel], Iterator[Block]]  # blocks(recording, noise), in any order
 
 
-def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[FilterInput]:
+def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked._fields) -> Tracked:
+    """Join the blocks of N samples; columns that are not named are empty."""
+    asked = {name: np.empty(N) for name in names}
+    for rows, tracked in blocks:
+        for name, column in asked.items():
+            column[rows] = getattr(tracked, name)
+    return Tracked(**{name: asked.get(name, np.empty(0)) for name in Tracked._fields})
+
+
+def whole(blocks: BlockFilter) -> Filter:
+    """Return the filter of a whole recording, from one that filters it block by block."""
+
+    def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
+        return join_blocks(blocks(recording, noise), recording.samples)
+
+    return track
+
+
+def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[Recording]:
     """Return the segments of a joint's log for a filter, as measured; a filter restarts after each gap.
 
     `tau_hat` (N,) is the effort of another fit, to be subtracted instead of the model's effort.
     """
-    tau_known = model.tau_known if tau_hat is None else model.tau_known + (tau_hat - model.tau_hat)
-    return _segments(model, model.q_measured, model.dq_measured, tau_known)
+    return _segments(model, "_measured", tau_hat)
 
 
-def smooth_filter_inputs(model: JointModel) -> list[FilterInput]:
+def smooth_filter_inputs(model: JointModel) -> list[Recording]:
     """Return the segments of a joint's log for a filter, with the motion low-passed."""
-    return _segments(model, model.q, model.dq, model.tau_known)
+    return _segments(model, "", None)
 
 
-def _segments(model: JointModel, q: Array, dq: Array, tau_known: Array) -> list[FilterInput]:
+def _segments(model: JointModel, suffix: str, tau_hat: Array | None) -> list[Recording]:
     gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
-    joint = JointDynamics(model.inertia, (model.constant, *gravity, model.spring, *friction), tau_known)
-    initial_std = float(np.std(model.tau)) or 1.0
-    whole = FilterInput(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, initial_std)
-    return [whole.part(part) for part in segments(model.segment)]
+    coefficients = (model.constant, *gravity, model.spring, *friction)
+    T_s, initial_std = 1.0 / model.rate, float(np.std(model.tau)) or 1.0
+
+    def read(start: int, rows: slice) -> FilterInput:
+        which = slice(start + rows.start, start + rows.stop)
+        part = model.part(which)
+        known = part.tau_known if tau_hat is None else part.tau_known + (tau_hat[which] - part.tau_hat)
+        q, dq = getattr(part, f"q{suffix}"), getattr(part, f"dq{suffix}")
+        return FilterInput(
+            JointDynamics(part.inertia, coefficients, known), q, dq, part.ddq, part.tau, T_s, initial_std
+        )
+
+    inputs = [LongInput(s.stop - s.start, T_s, initial_std, partial(read, s.start)) for s in segments(model.segment)]
+    return [long.part(slice(0, long.samples)) if long.samples <= BLOCK_SAMPLES else long for long in inputs]

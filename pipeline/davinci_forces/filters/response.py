@@ -6,13 +6,21 @@ the setting `delay` after the peak of the push.  `q_tau` of a `NoiseModel` is th
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, ekf, tracker
-from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, stationary_joint
+from davinci_forces.filters import DEFAULT, ekf, filter_parts, tracker
+from davinci_forces.filters.problem import (
+    Filter,
+    FilterInput,
+    LongInput,
+    NoiseModel,
+    Recording,
+    column,
+    stationary_joint,
+)
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import VISCOUS
@@ -55,12 +63,13 @@ def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: fl
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
 
 
-def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
+def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     """Compute the rise time [s] of a filter's unit step response on a joint at rest: 1 / its steepest slope."""
-    T_s, joint = recording.T_s, recording.joint
+    T_s, joint = recording.T_s, recording.part(slice(0, 1)).joint
+    inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
-    inertia, step = np.full(len(t), float(np.mean(joint.inertia))), np.where(t >= BEFORE, 1.0, 0.0)
-    stepped = stationary_joint(inertia, joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
+    step = np.where(t >= BEFORE, 1.0, 0.0)
+    stepped = stationary_joint(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
     return float(T_s / max(np.diff(track(stepped, noise).tau_ext).max(), 1e-9))
 
 
@@ -103,15 +112,22 @@ def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name:
     )  # fmt: skip
 
 
-def lag_error(recordings: Sequence[FilterInput], smoothed: Array, noise: NoiseModel) -> Array:
+def lag_error(recordings: Sequence[Recording], smoothed: Array, noise: NoiseModel) -> Array:
     """Return the error (N,) that the filter's lag makes in recordings, computed from the smoothed external effort (N,).
 
     The error is the smoothed effort minus the filter's response to it.  That response is computed for a joint at rest,
     where the filter is linear: position and velocity stay 0.
     """
-    first = np.cumsum([len(recording.q) for recording in recordings])[:-1]
-    inputs_at_rest = (
-        stationary_joint(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.initial_std)
-        for part, tau_ext in zip(recordings, np.split(smoothed, first), strict=True)
-    )
-    return np.asarray(smoothed - np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest]))
+    first = np.cumsum([recording.samples for recording in recordings])[:-1]
+
+    def at_rest(recording: Recording, tau_ext: Array, rows: slice) -> FilterInput:
+        joint = recording.part(rows).joint
+        viscous = joint.coefficients[VISCOUS]
+        return stationary_joint(joint.inertia, viscous, tau_ext[rows], recording.T_s, recording.initial_std)
+
+    inputs = [
+        LongInput(recording.samples, recording.T_s, recording.initial_std, partial(at_rest, recording, tau_ext))
+        for recording, tau_ext in zip(recordings, np.split(smoothed, first), strict=True)
+    ]
+    shown = filter_parts(DEFAULT, inputs, noise, ("tau_ext",)).tau_ext
+    return np.subtract(smoothed, shown, out=shown)

@@ -8,11 +8,12 @@ equals that of Rauch, Tung and Striebel, without an inverse of P:
     x|N = x- - P- l~,    P|N = P- - P- L~ P-,    l^ = F' l~ and L^ = F' L~ F one sample earlier
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.filters.stepping import arguments, correct, gains, predict, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
@@ -22,26 +23,44 @@ MIN_VARIANCE_SHARE = 1e-12  # a smoothed variance with a smaller share of the pr
 STORED = 15  # numbers stored per sample: its prediction, and the transition to the next sample
 
 
-def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Filter a recording forwards and smooth it backwards; the innovations are the filter's."""
-    innovations, stored = forwards(recording, noise)
-    out = np.empty((4, len(recording.q)))
-    _backwards(stored, noise.r_q**2, noise.r_dq**2, *out, *innovations[:2])
-    return Tracked(*out, *innovations)
+def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
+    """Smooth a recording block by block, the last one first; the forward pass of the others is computed again."""
+    starts, after = list[tuple[slice, Any]](), np.zeros(0)
+    for rows, before, innovations, stored in forwards(recording, noise):
+        starts.append((rows, before))
+        last = innovations, stored
+    for rows, before in reversed(starts):
+        if rows.stop < recording.samples:
+            last = _forwards_from(before, recording.part(rows), noise)[1:]
+        innovations, stored = last
+        out = np.empty((4, rows.stop - rows.start))
+        after = _backwards(stored, noise.r_q**2, noise.r_dq**2, after, *out, *innovations[:2])
+        yield rows, Tracked(*out, *innovations)
 
 
-def forwards(recording: FilterInput, noise: NoiseModel) -> tuple[Array, Array]:
-    """Return the filter's innovations and NIS (3, N), and its predictions and F of each sample (N, `STORED`)."""
-    out, stored = np.empty((3, len(recording.q))), np.empty((len(recording.q), STORED))
-    _forwards(stored, *arguments(recording, noise), *out)
-    return out, stored
+track = whole(blocks)
+
+
+def forwards(recording: Recording, noise: NoiseModel) -> Iterator[tuple[slice, Any, Array, Array]]:
+    """Yield blocks of n samples: the belief before, innovations and NIS (3, n), predictions and F (n, `STORED`)."""
+    before: Any = None
+    for rows, part in input_blocks(recording):
+        before = before or arguments(part, noise)[0]
+        after, innovations, stored = _forwards_from(before, part, noise)
+        yield rows, before, innovations, stored
+        before = after
+
+
+def _forwards_from(before: Any, part: FilterInput, noise: NoiseModel) -> tuple[Any, Array, Array]:
+    out, stored = np.empty((3, part.samples)), np.empty((part.samples, STORED))
+    return _forwards(stored, before, *arguments(part, noise)[1:], *out), out, stored
 
 
 @compile_and_store
 def _forwards(
     stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
-) -> None:  # fmt: skip
+) -> Any:  # fmt: skip
     for k in range(len(y_q)):
         for i in range(9):
             stored[k, i] = s[i]
@@ -51,16 +70,32 @@ def _forwards(
         for i in range(6):
             stored[k, 9 + i] = F[i]
         s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
+    return s
 
 
 @compile_and_store
 def _backwards(
-    stored: Array, R_q: float, R_dq: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any, i_dq: Any
-) -> None:
+    stored: Array, R_q: float, R_dq: float, after: Any, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any,
+    i_dq: Any,
+) -> Any:  # fmt: skip
+    """Run backwards from `after`: l~ and L~ of the next sample (9,), or nothing after the last sample."""
     l1, l2, l3 = 0.0, 0.0, 0.0
     L11, L12, L13, L22, L23, L33 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if len(after):
+        l1, l2, l3 = after[0], after[1], after[2]
+        L11, L12, L13, L22, L23, L33 = after[3], after[4], after[5], after[6], after[7], after[8]
     for k in range(len(i_q) - 1, -1, -1):
         row = stored[k]
+        if k < len(i_q) - 1 or len(after):
+            f11, f12, f13, f21, f22, f23 = row[9], row[10], row[11], row[12], row[13], row[14]
+            l1, l2, l3 = f11 * l1 + f21 * l2, f12 * l1 + f22 * l2, f13 * l1 + f23 * l2 + l3
+            # L~ F, then F' L~ F
+            h11, h12, h13 = L11 * f11 + L12 * f21, L11 * f12 + L12 * f22, L11 * f13 + L12 * f23 + L13
+            h21, h22, h23 = L12 * f11 + L22 * f21, L12 * f12 + L22 * f22, L12 * f13 + L22 * f23 + L23
+            h33 = L13 * f13 + L23 * f23 + L33
+            L11, L12, L13 = f11 * h11 + f21 * h21, f11 * h12 + f21 * h22, f11 * h13 + f21 * h23
+            L22, L23 = f12 * h12 + f22 * h22, f12 * h13 + f22 * h23
+            L33 = f13 * h13 + f23 * h23 + h33
         a, b, c, d, e, f = row[3], row[4], row[5], row[6], row[7], row[8]
         s = (row[0], row[1], row[2], a, b, c, d, e, f)
         v_qq, v_qd, v_dd, k11, k12, k21, k22, k31, k32, _ = gains(s, R_q, R_dq)
@@ -80,14 +115,4 @@ def _backwards(
         out_tau[k] = row[2] - c * l1 - e * l2 - f * l3
         reduction = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
         out_std[k] = max(f - reduction, MIN_VARIANCE_SHARE * f) ** 0.5
-        if k > 0:
-            before = stored[k - 1]
-            f11, f12, f13, f21, f22, f23 = before[9], before[10], before[11], before[12], before[13], before[14]
-            l1, l2, l3 = f11 * l1 + f21 * l2, f12 * l1 + f22 * l2, f13 * l1 + f23 * l2 + l3
-            # L~ F, then F' L~ F
-            h11, h12, h13 = L11 * f11 + L12 * f21, L11 * f12 + L12 * f22, L11 * f13 + L12 * f23 + L13
-            h21, h22, h23 = L12 * f11 + L22 * f21, L12 * f12 + L22 * f22, L12 * f13 + L22 * f23 + L23
-            h33 = L13 * f13 + L23 * f23 + L33
-            L11, L12, L13 = f11 * h11 + f21 * h21, f11 * h12 + f21 * h22, f11 * h13 + f21 * h23
-            L22, L23 = f12 * h12 + f22 * h22, f12 * h13 + f22 * h23
-            L33 = f13 * h13 + f23 * h23 + h33
+    return np.array([l1, l2, l3, L11, L12, L13, L22, L23, L33])

@@ -1,15 +1,14 @@
 """The model of each joint along a log, as a filter takes it, and the effort that a fit predicts along the log."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from davinci_forces.identification.regression import joined_motion, motion_at
 from davinci_forces.identification.used import Identified
-from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.models.memory import efforts
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
+from davinci_forces.maths.models.memory import efforts, pieces
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics
 from davinci_forces.maths.signals.smoothing import delay_segments
 from davinci_forces.records import Fit, JointModel, Motion, Prediction
@@ -93,8 +92,10 @@ class LogModels:
 
     def with_fit(self, model: JointModel, fit: Fit) -> JointModel:
         """Return a joint's model by another fit, without predictions of unseen data."""
-        unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
-        return replace(model, **self.fields_of(fit, model.joint), **unknown)
+        unknown: dict[str, Any] = {
+            "scheme": "", "path_unseen": "", "tau_hat_unseen": np.broadcast_to(np.nan, len(model))
+        }  # fmt: skip
+        return JointModel.like(model, **self.fields_of(fit, model.joint), **unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:
@@ -119,12 +120,23 @@ def refit_effort(joint: JointModel, fit: Fit, along: LogModels, free: Booleans) 
     """Correct tau_hat (N,) of a fit by least squares on its residual along a joint's log, over the free samples (N,).
 
     Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1
+
+    The equations of a long log are reduced to as many as unknowns, block by block: by Q' [Phi, tau - tau_hat] = R.
     """
     model = along.identified.model(fit)
-    regressor = model.regressor(along.motion(fit, joint.joint))
-    valid = free & regressor.known
-    Phi = regressor.Phi[:, model.efforts.index(joint.joint)]
-    length = np.linalg.norm(Phi[valid], axis=0)
+    index, motion = model.efforts.index(joint.joint), along.motion(fit, joint.joint)
+    tau_hat, blocks, equations = joint.tau_hat.copy(), list(pieces(model, motion, samples=BLOCK_SAMPLES)), []
+    residual = joint.tau - tau_hat
+    for block in blocks:
+        regressor = model.regressor(block.motion)
+        valid = free[block.place] & regressor.known
+        rows = np.column_stack([regressor.Phi[valid, index], residual[block.place][valid]])
+        equations.append(rows if len(blocks) == 1 else np.linalg.qr(rows, mode="r"))
+    *columns, y = np.concatenate(equations).T
+    Phi = np.column_stack(columns)
+    length = np.linalg.norm(Phi, axis=0)
     scale = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)
-    d, *_ = np.linalg.lstsq(Phi[valid] * scale, (joint.tau - joint.tau_hat)[valid], rcond=MIN_SINGULAR_SHARE)
-    return np.asarray(joint.tau_hat + Phi @ (scale * d))
+    d, *_ = np.linalg.lstsq(Phi * scale, y, rcond=MIN_SINGULAR_SHARE)
+    for block in blocks:
+        tau_hat[block.place] += model.regressor(block.motion).Phi[:, index] @ (scale * d)
+    return tau_hat

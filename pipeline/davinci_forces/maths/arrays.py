@@ -9,6 +9,13 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
+BLOCK_SAMPLES = 1 << 18  # samples of a long recording that are worked on at once, so that memory does not limit it
+
+
+def row_blocks(N: int) -> list[slice]:
+    """Split N samples into blocks of `BLOCK_SAMPLES`, the last one shorter."""
+    return [slice(start, min(start + BLOCK_SAMPLES, N)) for start in range(0, N, BLOCK_SAMPLES)]
+
 
 def evenly(N: int, most: int) -> Integers:
     """Indices of at most `most` of N samples, evenly spaced, including the first and the last."""

@@ -14,12 +14,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadRecord
-from davinci_forces.maths.arrays import Array, Integers
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Integers, row_blocks
 
 Column = Array
 Counts = Integers
@@ -72,27 +73,56 @@ class Record:
 
     @classmethod
     def like(cls, source: object, **others: Any) -> Self:
-        """Return a record of other values, and for the rest the attributes of these names of a source."""
-        shared = {f.name: getattr(source, f.name) for f in fields(cls) if hasattr(source, f.name)}  # type: ignore[arg-type]
-        return cls(**{**shared, **others})
+        """Return a record of other values, and for the rest the attributes of these names of a source.
+
+        A record with columns of a lazy source is lazy, too.
+        """
+        if isinstance(source, Record) and "_read" in vars(source) and not others.keys() >= {*cls.columns()}:
+            scalars = {name: others[name] if name in others else getattr(source, name) for name in cls.scalars()}
+            read = vars(source)["_read"]
+            return cls.lazy(
+                scalars,
+                len(source),
+                lambda name, rows: others[name][rows].copy() if name in others else read(name, rows),
+            )
+        shared = (f.name for f in fields(cls) if f.name not in others and hasattr(source, f.name))  # type: ignore[arg-type]
+        return cls(**{name: getattr(source, name) for name in shared}, **others)
 
     @classmethod
-    def lazy(cls, scalars: Mapping[str, Any], column: Callable[[str], NDArray[Any]]) -> Self:
-        """Return a record with these scalars that reads a column, by its name, at every access.
+    def lazy(cls, scalars: Mapping[str, Any], length: int, read: Callable[[str, slice], NDArray[Any]]) -> Self:
+        """Return a record with these scalars that reads rows of a column, by its name, when they are accessed.
 
-        Each access checks the column; nothing checks that all columns have one length.
+        A column stays in memory while the stage uses it.  Each access checks what it reads.
         """
         record = object.__new__(cls)
-        record.__dict__.update(scalars, _column=column)
+        record.__dict__.update(scalars, _length=length, _read=read, _in_use=WeakValueDictionary())
         return record
+
+    def part(self, which: slice) -> Self:
+        """Return the record of some of the rows; that of a lazy record is lazy, too."""
+        scalars = {name: getattr(self, name) for name in self.scalars()}
+        if read := self.__dict__.get("_read"):
+            start, stop, _ = which.indices(len(self))
+            return self.lazy(scalars, stop - start, lambda name, rows: read(name, slice(
+                start + (rows.start or 0), stop if rows.stop is None else start + rows.stop
+            )))  # fmt: skip
+        return type(self)(**scalars, **{name: getattr(self, name)[which] for name in self.columns()})
+
+    def blocks(self) -> Iterator[Self]:
+        """Yield the record, or one of many rows in parts."""
+        is_long = len(self) > BLOCK_SAMPLES
+        return (self.part(rows) for rows in row_blocks(len(self))) if is_long else iter([self])
 
     if not TYPE_CHECKING:  # so that type checkers still report names that no record has
 
         def __getattr__(self, name: str) -> Any:
             """Read a column of a lazy record; Python calls this only where there is no such attribute."""
-            if name not in self.columns() or "_column" not in self.__dict__:
+            if name not in self.columns() or "_read" not in self.__dict__:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            return self._checked(name, self.__dict__["_column"](name))
+            column = self._in_use.get(name)
+            if column is None:
+                column = self._in_use[name] = self._checked(name, self._read(name, slice(None)))
+            return column
 
     @property
     def key(self) -> Names:
@@ -148,6 +178,8 @@ class Record:
 
     def __len__(self) -> int:
         columns = self.columns()
+        if "_length" in self.__dict__:
+            return int(self.__dict__["_length"])
         return len(getattr(self, columns[0])) if columns else 0
 
 

@@ -8,6 +8,7 @@ its name only when it is complete.
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from ctypes import CDLL
 from dataclasses import Field, fields
 from functools import cache, partial
 from pathlib import Path
@@ -19,13 +20,16 @@ import pyarrow.parquet as pq
 
 from davinci_forces.errors import BadRecord, MissingRecord, PipelineError
 from davinci_forces.files import digest, require_file, temporary_name
+from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from davinci_forces.records.quantities import QUANTITIES
 
 Unit = Callable[[str], str]
 
+MMAP_THRESHOLD, TRIM_THRESHOLD = -3, -1  # glibc's options: sizes above which it maps memory, and returns its top
+MAX_HEAP_BYTES, MAX_TOP_BYTES = 1 << 24, 1 << 26  # less of both makes short studies take twice the system's time
+
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
-MAX_ROWS_OF_GROUP = 1 << 24  # rows; a recording in one row group is read without a copy
 
 
 def path(kind: type[Record], key: Names) -> Path:
@@ -59,7 +63,7 @@ class Writer:
             target.parent.mkdir(parents=True, exist_ok=True)
             described = schema(type(record), self.unit(record))
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
-        self._open[place].write_table(_table(record, self._open[place].schema), MAX_ROWS_OF_GROUP)
+        self._open[place].write_table(_table(record, self._open[place].schema), BLOCK_SAMPLES)
         self._described[place] = self._metadata(record)
         return place
 
@@ -114,7 +118,7 @@ def _stored(kind: Any) -> list[Field[Any]]:
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", longest: int | None = None) -> AnyRecord:
     """Read a record with its origin; `sha256`, where given, saves hashing the file.
 
-    A record of more than `longest` rows reads each column at every access and keeps none.
+    A record of more than `longest` rows reads a column when it is accessed, and does not keep it.
 
     Raises
     ------
@@ -136,7 +140,7 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
             table = file.read()
             record = kind(**{name: _values(table[name]) for name in kind.columns()}, **scalars)
         else:
-            record = kind.lazy(scalars, partial(_column_of, kind, whole))
+            record = kind.lazy(scalars, file.metadata.num_rows, partial(_rows_of, kind, whole))
     object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
     return record
 
@@ -156,15 +160,39 @@ def _opened(kind: type[Record], whole: Path) -> Iterator[pq.ParquetFile]:
         raise BadRecord(f"{whole}: not a {kind.__name__} record of this version ({error}); run with --force") from error
 
 
-def _column_of(kind: type[Record], whole: Path, name: str) -> np.ndarray[Any, Any]:
-    """Read one column of the record in a file."""
+def _rows_of(kind: type[Record], whole: Path, name: str, which: slice) -> np.ndarray[Any, Any]:
+    """Read some rows of one column of the record in a file, group by group: no more is in memory than they are."""
     with _opened(kind, whole) as file:
-        return _values(file.read([name])[name])
+        start, stop, _ = which.indices(file.metadata.num_rows)
+        is_text = file.schema_arrow.field(name).type == pa.string()
+        # Arrow aligns numbers as it does those of a whole record: the last digit of a product depends on that.
+        dtype = np.dtype(object if is_text else str(file.schema_arrow.field(name).type))
+        size = stop - start
+        column = np.empty(size, dtype) if is_text else np.frombuffer(pa.allocate_buffer(8 * size), dtype)
+        end = 0
+        for group in range(file.num_row_groups):
+            first, end = end, end + file.metadata.row_group(group).num_rows
+            if first < stop and start < end:
+                values = _values(file.read_row_group(group, [name], use_threads=False)[name])
+                column[max(first - start, 0) : end - start] = values[max(start - first, 0) : stop - first]
+        return column
 
 
 def release() -> None:
-    """Release the memory that Arrow retains after reading and writing records."""
-    pa.default_memory_pool().release_unused()
+    """Return to the system the memory that the C library retains after a task."""
+    with suppress(OSError, AttributeError):  # only glibc has this function
+        CDLL(None).malloc_trim(0)
+
+
+def _return_columns() -> None:
+    """Have the memory of a long column returned to the system as soon as it is free."""
+    pa.set_memory_pool(pa.system_memory_pool())
+    with suppress(OSError, AttributeError):
+        CDLL(None).mallopt(MMAP_THRESHOLD, MAX_HEAP_BYTES)
+        CDLL(None).mallopt(TRIM_THRESHOLD, MAX_TOP_BYTES)
+
+
+_return_columns()
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:

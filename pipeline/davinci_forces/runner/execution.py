@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from davinci_forces.errors import BadLog, PipelineError
 from davinci_forces.files import digest
 from davinci_forces.logs.log import Log
+from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
@@ -132,7 +133,7 @@ def _record(folders: Folders, task: Task, located: Located) -> Record:
 def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
     from davinci_forces.records import store
 
-    return store.read(KINDS[kind], folder, Path(place), sha256)
+    return store.read(KINDS[kind], folder, Path(place), sha256, BLOCK_SAMPLES)
 
 
 _read_cached = lru_cache(maxsize=256)(_read)

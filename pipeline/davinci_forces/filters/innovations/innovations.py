@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import rts
-from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Recording
 from davinci_forces.maths.arrays import Array
 
 MIN_SHARE_AT_REST = 1e-3  # least share of an innovation's variance that is not due to the clock
@@ -32,14 +32,20 @@ class Innovations(NamedTuple):
     dq_std: Array
 
 
-def innovations(recording: FilterInput, noise: NoiseModel) -> Innovations:
+def innovations(recording: Recording, noise: NoiseModel) -> Innovations:
     """Compute the innovations of `ekf`, number for number, by the smoother's forward pass.  (7.6), (7.7)"""
-    (i_q, i_dq, _), predicted = rts.forwards(recording, noise)
-    return Innovations(i_q, i_dq, np.sqrt(predicted[:, 3] + noise.r_q**2), np.sqrt(predicted[:, 6] + noise.r_dq**2))
+    result = Innovations(*(np.empty(recording.samples) for _ in Innovations._fields))
+    for rows, _, (i_q, i_dq, _), predicted in rts.forwards(recording, noise):
+        stds = np.sqrt(predicted[:, 3] + noise.r_q**2), np.sqrt(predicted[:, 6] + noise.r_dq**2)
+        for column, values in zip(result, (i_q, i_dq, *stds), strict=True):
+            column[rows] = values
+    return result
 
 
 def delays(velocities: Sequence[Array], innovations: Sequence[Array]) -> list[Array]:
     """Estimate how late [s] each sample (N,) was taken: for each joint, from all other joints."""
+    if len(velocities) == 1:
+        return [np.zeros_like(velocities[0])]
     variances = [fit_variances(dq, i) for dq, i in zip(velocities, innovations, strict=True)]
     numerators = [dq * i / r2 for dq, i, (r2, _) in zip(velocities, innovations, variances, strict=True)]
     weights = [dq**2 / r2 for dq, (r2, _) in zip(velocities, variances, strict=True)]

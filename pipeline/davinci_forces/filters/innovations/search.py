@@ -26,7 +26,7 @@ from davinci_forces.filters.innovations.trials import (
 )
 
 MIN_GROWTH = 100.0  # least factor by which the removal of a cause increases the smallest probability
-MAX_SAMPLES_SEARCH = 50_000
+MAX_SAMPLES_SEARCH = 50_000  # the first samples of a run
 MIN_SAMPLES_TRIAL = 200  # tests on fewer samples are ignored
 NEARLY_BEST = 0.95  # a trial is nearly best if it explains this part of the largest share
 MAX_CAUSES = 3  # largest number of causes removed at once
@@ -63,9 +63,6 @@ class CauseSearch(NamedTuple):
 
 def search(subject: Subject) -> CauseSearch:
     """Find the fewest causes without which the innovations are white."""
-    first = next(iter(subject.models.values()))
-    if len(first.q) > MAX_SAMPLES_SEARCH:
-        subject = shorten(subject)
     passes = Passes(subject)
     trials = [passes.trial(())]
     possible_causes = list(causes(subject))
@@ -114,13 +111,6 @@ def may_combine(without: tuple[str, ...], subject: Subject, explaining: list[Tri
         return True
     simpler = {*without} - {CLOCK, COLOUR} | {SIZES}
     return others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining)
-
-
-def shorten(subject: Subject) -> Subject:
-    """Return the first samples of a run."""
-    first = slice(MAX_SAMPLES_SEARCH)
-    models = {name: recording.part(first) for name, recording in subject.models.items()}
-    return subject._replace(models=models, free=subject.free[first], moving=subject.moving[first])
 
 
 def classify(search: CauseSearch) -> str:

@@ -57,8 +57,7 @@ class Event(NamedTuple):
 
 def free_motion_statistics(tau_ext: Array, free: Booleans, rate: float) -> FreeMotionStatistics:
     """Statistics of an effort (N,) at `rate` [Hz] at its `free` samples (N,)."""
-    x, follows = tau_ext[free], np.diff(np.flatnonzero(free)) == 1
-    upwards = (x[:-1] < 0.0) & (x[1:] >= 0.0) & follows
+    x, upwards = tau_ext[free], (tau_ext[:-1] < 0.0) & (tau_ext[1:] >= 0.0) & free[:-1] & free[1:]
     rms = float(np.sqrt(np.mean(x**2)))
     return FreeMotionStatistics(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import Coefficients, bias
-from davinci_forces.maths.models.memory import friction_state
+from davinci_forces.maths.models.memory import efforts, friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
 
@@ -93,7 +93,7 @@ class IndependentJoint:
     def bias(self, theta: Array, motion: ArmMotion) -> Array:
         """V + F + G (N, 1)."""
         still = motion._replace(ddq=np.zeros_like(motion.ddq))
-        return np.asarray(self.regressor(still).Phi @ theta)
+        return efforts(self, theta, still)
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
         """Terms of q, dq and ddq as inertia and coefficients; friction with a state z as known effort."""

@@ -64,13 +64,13 @@ class Piece(NamedTuple):
     place: slice  # samples of the part in the whole motion
 
 
-def pieces(model: Model, motion: ArmMotion, beside: int = 0) -> Iterator[Piece]:
-    """Yield a motion in parts, each with up to `beside` more samples before and after."""
+def pieces(model: Model, motion: ArmMotion, beside: int = 0, samples: int = PIECE_SAMPLES) -> Iterator[Piece]:
+    """Yield a motion in parts of these samples, each with up to `beside` more samples before and after."""
     N = len(motion.q)
-    if N > PIECE_SAMPLES:
+    if samples < N:
         motion = motion._replace(memory={key: deflection(motion, *key) for key in model.displacements})
-    for start in range(0, N, PIECE_SAMPLES):
-        stop, first = min(start + PIECE_SAMPLES, N), max(start - beside, 0)
+    for start in range(0, N, samples):
+        stop, first = min(start + samples, N), max(start - beside, 0)
         inside = slice(start - first, stop - first)
         yield Piece(select_samples(motion, slice(first, min(stop + beside, N))), inside, slice(start, stop))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks
 from davinci_forces.maths.signals.smoothing import NORMAL_MAD, segments
 
 HOLD = 1.0  # [s] shortest standstill: longer than a motion takes to reverse
@@ -65,6 +65,9 @@ def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:
     standing = np.abs(dq) <= SLOW * rms_velocity
     standing[1:] |= np.sign(dq[1:]) != np.sign(dq[:-1])
     standing_before = np.cumsum(np.concatenate([[0], standing]))
-    k, N = np.arange(len(dq)), len(dq)
-    first, last = np.maximum(k - round(AFTER / T_s), 0), np.minimum(k + round(BEFORE / T_s) + 1, N)
-    return np.asarray(standing_before[last] == standing_before[first])
+    far, N = np.empty(len(dq), np.bool_), len(dq)
+    for rows in row_blocks(N):
+        k = np.arange(rows.start, rows.stop)
+        first, last = np.maximum(k - round(AFTER / T_s), 0), np.minimum(k + round(BEFORE / T_s) + 1, N)
+        far[rows] = standing_before[last] == standing_before[first]
+    return far

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array
 
 TWO_SIDED_95, TWO_SIDED_99 = 1.96, 2.576  # standard deviations within which 95 and 99 % of a normal distribution lie
 MIN_SAMPLES_WHITENESS = 20  # fewer samples are not tested
@@ -111,7 +111,12 @@ def cross_correlation(x: Array, u: Array, lags: int) -> Array:
     """The correlation (lags + 1,) of x(t) with u(t - k), k from 0 to lags; 0 where u is constant."""
     from statsmodels.tsa.stattools import ccf
 
-    return np.asarray(ccf(x, u, adjusted=False, nlags=lags + 1)) if np.ptp(u) > 0 else np.zeros(lags + 1)
+    if np.ptp(u) == 0:
+        return np.zeros(lags + 1)
+    if len(x) <= BLOCK_SAMPLES:
+        return np.asarray(ccf(x, u, adjusted=False, nlags=lags + 1))
+    x, u, N = x - x.mean(), u - u.mean(), len(x)  # a few lags of a long series, without its Fourier transform
+    return np.array([x[k:] @ u[: N - k] for k in range(lags + 1)]) / np.sqrt((x @ x) * (u @ u))
 
 
 def shape(x: Array) -> tuple[float, float, float]:

@@ -116,10 +116,11 @@ def root_mean_square(x: Array, scale: Array | None = None) -> tuple[float, float
 
     The standard error is that of R = mean x^2 / mean y^2, from the mean of x^2 - R y^2 over blocks.
     """
-    squares = np.ones(len(x)) if scale is None else scale**2
+    deviations, squares = x**2, np.ones(1) if scale is None else scale**2
     power = float(np.mean(squares)) or 1.0
-    ratio = float(np.mean(x**2)) / power
-    return root(ratio, error_of_pooled_mean(x**2 - ratio * squares) / power)
+    ratio = float(np.mean(deviations)) / power
+    deviations -= ratio * squares
+    return root(ratio, error_of_pooled_mean(deviations) / power)
 
 
 def root(square: float, std: float) -> tuple[float, float]:

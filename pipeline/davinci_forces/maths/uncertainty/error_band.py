@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans, Integers, evenly, row_blocks
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, error_of_quantile
 
 SPEED_RANGES = 4  # ranges of speed, between quartiles of the calibrating motion
@@ -69,7 +69,11 @@ class Calibration(NamedTuple):
 
     def variance(self, std: Array, dq: Array) -> Array:
         """Total variance (N,) from the smoother's own deviation (N,), along its velocity (N,)."""
-        return np.asarray(self.factor[speed_range(dq, self.edges)] ** 2 * (std**2 + self.model_variance))
+        variance = np.empty(len(dq))
+        for rows in row_blocks(len(dq)):
+            factor = self.factor[speed_range(dq[rows], self.edges)]
+            variance[rows] = factor**2 * (std[rows] ** 2 + self.model_variance)
+        return variance
 
 
 def speed_range(dq: Array, edges: Array) -> Integers:
@@ -113,12 +117,29 @@ def students_95(degrees: int) -> float:
 def count_uncorrelated(x: Array) -> float:
     """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero."""
     centred = x - x.mean()
+    if len(x) > BLOCK_SAMPLES:
+        return _count_in_blocks(centred)
     power = np.abs(np.fft.rfft(centred, 2 * len(x))) ** 2
     covariance = np.fft.irfft(power)[: len(x)]
     if covariance[0] <= 0.0:
         return 1.0
     until = int(np.argmax(covariance < 0.0)) or len(x)
     return float(max(len(x) / (1.0 + 2.0 * np.sum(covariance[1:until]) / covariance[0]), 1.0))
+
+
+def _count_in_blocks(centred: Array) -> float:
+    """`count_uncorrelated` of a long series: the autocovariance block by block, as far as its first zero."""
+    N, lags = len(centred), BLOCK_SAMPLES // 4
+    covariance = np.ones(1)
+    while covariance.min() >= 0.0 and len(covariance) < N:
+        lags, covariance = min(2 * lags, N), np.zeros(min(2 * lags, N))
+        for start in range(0, N, lags):
+            block, reached = (np.fft.rfft(centred[start : start + n], 4 * lags) for n in (lags, 2 * lags))
+            covariance += np.fft.irfft(block.conj() * reached)[:lags]
+    if covariance[0] <= 0.0:
+        return 1.0
+    until = int(np.argmax(covariance < 0.0)) or N
+    return float(max(N / (1.0 + 2.0 * np.sum(covariance[1:until]) / covariance[0]), 1.0))
 
 
 def coverage_by_speed(tau_ext: Array, std: Array, dq: Array) -> tuple[Array, Array]:

@@ -1,12 +1,19 @@
 """Compare all filters: the level of their estimates in free space, and their response to a push added to the effort."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
+from functools import partial
 
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, FILTERS, filter_parts
-from davinci_forces.filters.problem import FilterInput, NoiseModel, filter_inputs, smooth_filter_inputs
+from davinci_forces.filters.problem import (
+    FilterInput,
+    LongInput,
+    NoiseModel,
+    Recording,
+    filter_inputs,
+    smooth_filter_inputs,
+)
 from davinci_forces.filters.response import DURATION, half_sine, noise_model, response
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import FALLBACK, Identified
@@ -34,15 +41,20 @@ def run(
     unfitted = entry.role != "identification" and entry.has_known_free_motion
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return
-    variants, identified = [(name.replace("_", "-"), name, model) for name in FILTERS], Identified(robot, fits)
+    joint = robot.joint(model.joint)
+    for label, name, variant in variants(model, Identified(robot, fits)):
+        filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau, name)
+        yield from compare(label, name, variant, filter_noise, free, PUSH[joint.kind])
+
+
+def variants(model: JointModel, identified: Identified) -> Iterator[tuple[str, str, JointModel]]:
+    """Yield a label, the name of the filter, and the model of each comparison."""
+    yield from ((name.replace("_", "-"), name, model) for name in FILTERS)
     fit = identified.fit_of(model.joint, FALLBACK)
     if fit is not None and model.model != "independent":
         independent = LogModels(identified, [model]).with_fit(model, fit)
-        variants += [(INDEPENDENT, DEFAULT, independent)] if independent.inertia.min() > 0 else []
-    joint = robot.joint(model.joint)
-    for label, name, variant in variants:
-        filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau, name)
-        yield from compare(label, name, variant, filter_noise, free, PUSH[joint.kind])
+        if independent.inertia.min() > 0:
+            yield INDEPENDENT, DEFAULT, independent
 
 
 def compare(
@@ -50,12 +62,13 @@ def compare(
 ) -> Iterator[Comparison | Diagnostic]:
     """Filter a joint of a log without and with a push; measure the level in free space and the response."""
     parts = smooth_filter_inputs(model) if name == "direct" else filter_inputs(model)
-    estimate = filter_parts(name, parts, noise)
+    estimate = filter_parts(name, parts, noise, ("tau_ext", "tau_ext_std"))
     if not np.isfinite(estimate.tau_ext).all():
         return
     space = levels(estimate.tau_ext[free], estimate.tau_ext_std[free])
     pushed, start = add_push(model.t, parts, free, push)
-    shown = response(filter_parts(name, pushed, noise).tau_ext - estimate.tau_ext, model.t, start, push)
+    change = filter_parts(name, pushed, noise, ("tau_ext",)).tau_ext
+    shown = response(np.subtract(change, estimate.tau_ext, out=change), model.t, start, push)
     if label == DEFAULT and shown.share < MIN_PUSH_SHARE:
         message = f"{model.log}/{model.joint}: the filter shows only {shown.share:.0%} of a push of {DURATION:g} s"
         yield diagnostic(
@@ -69,10 +82,15 @@ def compare(
     )  # fmt: skip
 
 
-def add_push(t: Array, parts: Sequence[FilterInput], free: Booleans, push: float) -> tuple[list[FilterInput], float]:
+def add_push(t: Array, parts: Sequence[Recording], free: Booleans, push: float) -> tuple[list[LongInput], float]:
     """Add a push to the recorded effort, in the middle of the longest free space, and return its start [s]."""
     longest = max(runs(free), key=lambda run: run.stop - run.start)
     start = float(t[(longest.start + longest.stop) // 2]) - 0.5 * DURATION
-    added, first = push * half_sine(t, start), np.cumsum([0, *(len(part.q) for part in parts)])
-    spans = pairwise(first.tolist())
-    return [part._replace(tau=part.tau + added[a:b]) for part, (a, b) in zip(parts, spans, strict=True)], start
+    added, first = push * half_sine(t, start), np.cumsum([0, *(part.samples for part in parts)])
+
+    def add_to_part(part: Recording, push: Array, rows: slice) -> FilterInput:
+        recorded = part.part(rows)
+        return recorded._replace(tau=recorded.tau + push[rows])
+
+    pairs = zip(parts, np.split(added, first[1:-1]), strict=True)
+    return [LongInput(x.samples, x.T_s, x.initial_std, partial(add_to_part, x, push)) for x, push in pairs], start

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, filter_parts, rts
-from davinci_forces.filters.error_bands import TotalVariance, total_variance
-from davinci_forces.filters.problem import NoiseModel, filter_inputs
+from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, rts
+from davinci_forces.filters.error_bands import total_variance
+from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
@@ -37,74 +37,93 @@ def track_effort(
     model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry
 ) -> Iterator[Track | Diagnostic]:
     """Estimate the external effort of one joint of a log, with its error."""
-    parts = filter_inputs(model)
-    estimate = filter_parts(DEFAULT, parts, noise)
+    parts, moving = filter_inputs(model), (model.unscored == 0) | bool(model.at_rest)
+    offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)
+    converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
+    estimate = filter_parts(DEFAULT, parts, noise, ("tau_ext", "tau_ext_std", "nis"))
     if diverges(estimate):
         yield divergence_warning(model, float(np.mean(estimate.nis)))
         if not np.isfinite(estimate.tau_ext).all():
             return
-    smooth = filter_parts(SMOOTHER, parts, noise)
-    late = lag_error(parts, smooth.tau_ext, noise)
-    smooth_rise = rise(rts.track, parts[0], noise)
-    moving = (model.unscored == 0) | bool(model.at_rest)
-    offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)
     if offset.drifts:
         yield drift_warning(model, offset)
-    own = smooth.tau_ext_std
-    total = TotalVariance(own**2, np.zeros(len(model)), "")
-    if band is not None:
-        total = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
-    model_variance = np.maximum(total.variance - own**2, 0.0)
-    # At standstill, friction is anywhere between its static levels: a uniform distribution.
-    friction = model.standing * model.static_friction**2 / 3.0
-    converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    free = free_space(model.t, entry.contact, model.rate, model.unscored)
-    model_part, effort_free = float(np.sqrt(np.mean(model_variance))), (estimate.tau_ext - offset.value)[free]
-    yield Track(
-        log=model.log,
-        joint=model.joint,
-        model=model.model,
-        estimator=model.estimator,
-        filter=DEFAULT,
-        role=model.role,
-        path=model.path,
-        at_rest=model.at_rest,
-        rate=model.rate,
-        tau_ext_rms=rms(effort_free),
-        tau_ext_rms_std=root_mean_square(effort_free)[1] if free.any() else float("nan"),
-        nis_mean=float(np.mean(estimate.nis[converged])),
-        nis_mean_std=error_of_pooled_mean(estimate.nis[converged]),
-        r_q=noise.r_q,
-        r_dq=noise.r_dq,
-        q_dq=noise.q_dq,
-        q_tau=noise.q_tau * model.rate**0.5,
-        day_offset=offset.value,
-        day_offset_std=offset.std,
-        filter_part=rms(estimate.tau_ext_std[converged]),
-        model_part=model_part,
-        model_part_std=float(np.sqrt(model_part**2 + np.mean(total.std))) - model_part,
-        lag_part=rms(late[converged]),
-        smooth_part=rms(np.minimum(own, np.sqrt(total.variance))[converged]),
-        smooth_rise=smooth_rise,
-        static_friction=model.static_friction,
-        band_from=total.source,
-        t=model.t,
-        q=estimate.q,
-        dq=estimate.dq,
-        tau=model.tau,
-        tau_hat=model.tau_hat,
-        tau_ext=estimate.tau_ext - offset.value,
-        tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late**2 + model_variance + offset.std**2 + friction),
-        tau_ext_std_filter=estimate.tau_ext_std,
-        tau_ext_smooth=smooth.tau_ext - offset.value,
-        tau_ext_smooth_std=np.sqrt(total.variance + offset.std**2 + friction),
-        tau_ext_direct=model.tau - model.tau_hat - offset.value,
-        innovation_q=estimate.innovation_q,
-        innovation_dq=estimate.innovation_dq,
-        nis=estimate.nis,
-        standing=model.standing,
-        unscored=model.unscored,
-    )
+    numbers = numbers_of(estimate, offset, converged, free_space(model.t, entry.contact, model.rate, model.unscored))
+    del estimate
+    smoothed, own = filter_parts(SMOOTHER, parts, noise, ("tau_ext", "tau_ext_std"))[2:4]
+    late = lag_error(parts, smoothed, noise)
+    variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
+    excess = own**2
+    model_part = float(np.sqrt(np.mean(np.maximum(np.subtract(variance, excess, out=excess), 0.0, out=excess))))
+    np.minimum(own, np.sqrt(variance, out=excess), out=excess)
+    numbers |= {
+        "model_part": model_part,
+        "model_part_std": float(np.sqrt(model_part**2 + variance_std)) - model_part,
+        "lag_part": rms(late[converged]),
+        "smooth_part": rms(excess[converged]),
+        "smooth_rise": rise(rts.track, parts[0], noise),
+    }
+    del excess
+    for rows, estimate in gather_blocks(filter_blocks(DEFAULT, parts, noise)):
+        part = model.part(rows)
+        # At standstill, friction is anywhere between its static levels: a uniform distribution.
+        friction = part.standing * part.static_friction**2 / 3.0
+        model_variance = np.maximum(variance[rows] - own[rows] ** 2, 0.0)
+        yield Track(
+            log=model.log,
+            joint=model.joint,
+            model=model.model,
+            estimator=model.estimator,
+            filter=DEFAULT,
+            role=model.role,
+            path=model.path,
+            at_rest=model.at_rest,
+            rate=model.rate,
+            r_q=noise.r_q,
+            r_dq=noise.r_dq,
+            q_dq=noise.q_dq,
+            q_tau=noise.q_tau * model.rate**0.5,
+            day_offset=offset.value,
+            day_offset_std=offset.std,
+            static_friction=model.static_friction,
+            band_from=source,
+            **numbers,
+            t=part.t,
+            q=estimate.q,
+            dq=estimate.dq,
+            tau=part.tau,
+            tau_hat=part.tau_hat,
+            tau_ext=estimate.tau_ext - offset.value,
+            tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late[rows] ** 2 + model_variance + offset.std**2 + friction),
+            tau_ext_std_filter=estimate.tau_ext_std,
+            tau_ext_smooth=smoothed[rows] - offset.value,
+            tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction),
+            tau_ext_direct=part.tau - part.tau_hat - offset.value,
+            innovation_q=estimate.innovation_q,
+            innovation_dq=estimate.innovation_dq,
+            nis=estimate.nis,
+            standing=part.standing,
+            unscored=part.unscored,
+        )
+
+
+def numbers_of(estimate: Tracked, offset: DayOffset, converged: Booleans, free: Booleans) -> dict[str, float]:
+    """The numbers of a filter's estimate, after its transients and in free space, as fields of a Track."""
+    effort_free, nis = (estimate.tau_ext - offset.value)[free], estimate.nis[converged]
+    return {
+        "tau_ext_rms": rms(effort_free),
+        "tau_ext_rms_std": root_mean_square(effort_free)[1] if free.any() else float("nan"),
+        "nis_mean": float(np.mean(nis)),
+        "nis_mean_std": error_of_pooled_mean(nis),
+        "filter_part": rms(estimate.tau_ext_std[converged]),
+    }
+
+
+def variance_of(model: JointModel, band: ErrorBand | None, own: Array, is_centred: bool) -> tuple[Array, float, str]:
+    """The variance (N,) of the smoothed effort, the mean of its standard error, and their source; `total_variance`."""
+    if band is None:
+        return own**2, 0.0, ""
+    total = total_variance(band, model.log, model.path, model.dq, own, is_centred)
+    return total.variance, float(np.mean(total.std)), total.source
 
 
 def rms(x: Array) -> float:

@@ -74,10 +74,10 @@ def run(
         found = next((c for c in estimates if isinstance(c, Contact) and c.joint == model.joint), None)
         if fit is not None and track is not None and len(track) == len(model):
             noise = noises[model.joint]
-            causal = along.with_fit(model, fit)
-            estimate = filter_parts(
-                DEFAULT, filter_inputs(causal), noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau)
-            )
+            filter_noise = noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau)
+            parts = filter_inputs(along.with_fit(model, fit))
+            estimate = filter_parts(DEFAULT, parts, filter_noise, ("tau_ext", "nis"))
+            del parts
             if not diverges(estimate):
                 yield from compare(track, estimate.tau_ext - track.day_offset, found, entry, late, noise.delay)
 

@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters.innovations.innovations import Innovations, correct_times, delays, innovations
-from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
+from davinci_forces.filters.innovations.search import MAX_SAMPLES_SEARCH, CauseSearch, classify, search, verdict
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
-from davinci_forces.filters.problem import FilterInput, filter_inputs
+from davinci_forces.filters.problem import FilterInput, Recording, filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import LogModels, refit_effort
 from davinci_forces.identification.used import Identified
@@ -127,15 +127,18 @@ def apply(
     filter_noises = [noise_model(noise_of[m.joint], robot.joint(m.joint), 1.0 / m.rate, q_tau) for m in models]
     results = [innovations(longest_part(m), noise) for m, noise in zip(models, filter_noises, strict=True)]
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
-    for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
+    for model, noise, delay in zip(models, filter_noises, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
         motion = velocities(model)
         free = is_outside(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)])
-        yield from innovation_records(model, result, motion)
+        yield from innovation_records(model, results.pop(0), motion)
+        first = slice(MAX_SAMPLES_SEARCH)
+        moving = is_far_from_reversals(motion[0], 1.0 / model.rate)[first]
+        motion = motion[0][first].copy(), motion[1][first].copy()
         trials = dict(alternatives(model, along, free))
         if delay.any():
-            trials[CLOCK] = correct_times(longest_part(model), *motion, delay)
-        subject = Subject(trials, noise, free[part], is_far_from_reversals(motion[0], 1.0 / model.rate))
+            trials[CLOCK] = correct_times(tried_part(model), *motion, delay[first])
+        subject = Subject(trials, noise, free[part][first], moving)
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
@@ -145,24 +148,30 @@ def velocities(model: JointModel) -> tuple[Array, Array]:
     return model.dq[part], model.ddq[part]
 
 
-def longest_part(model: JointModel, tau_hat: Array | None = None) -> FilterInput:
+def longest_part(model: JointModel, tau_hat: Array | None = None) -> Recording:
     """The longest run of a joint's recording; `tau_hat` (N,) is the effort by another fit."""
-    return max(filter_inputs(model, tau_hat), key=lambda part: len(part.q))
+    return max(filter_inputs(model, tau_hat), key=lambda part: part.samples)
+
+
+def tried_part(model: JointModel, tau_hat: Array | None = None) -> FilterInput:
+    """The samples of the longest run in which causes are searched for."""
+    longest = longest_part(model, tau_hat)
+    return longest.part(slice(0, min(longest.samples, MAX_SAMPLES_SEARCH)))
 
 
 def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterator[tuple[str, FilterInput]]:
     """The joint under the model in use, with parameters fitted to this log, and under another structure."""
     identified, joint = along.identified, model.joint
     fit = identified.fit_of(joint, f"{model.model}.{model.estimator}")
-    yield "", longest_part(model)
+    yield "", tried_part(model)
     if fit is not None:
-        yield THIS_LOG, longest_part(model, refit_effort(model, fit, along, free))
+        yield THIS_LOG, tried_part(model, refit_effort(model, fit, along, free))
     structures = [f for f in identified.fits if f.group == joint and f.model != model.model]
     possible = [f for f in structures if set(along.joints) >= set(identified.model(f).joints)]
     for alternative in possible[:1]:  # of the models whose joints the log contains
         under = along.with_fit(model, alternative)
         if under.inertia.min() > 0:
-            yield alternative.model, longest_part(under)
+            yield alternative.model, tried_part(under)
 
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:

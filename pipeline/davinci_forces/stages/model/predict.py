@@ -129,6 +129,7 @@ def apply(
         joint_fit, stand_in = used[motion.joint]
         if stand_in:
             yield diagnostic("predict", about, "note", f"{name}: {stand_in}")
+        unscored = unscored_flags(motion, is_scored(motion, along, joint_fit, entry))
         terms = along.fields_of(joint_fit, motion.joint)
         if terms["inertia"].min() <= 0:
             yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit))
@@ -138,10 +139,10 @@ def apply(
         model = JointModel.like(
             motion, stand_in=stand_in, path=path, scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
-            unscored=unscored_flags(motion, is_scored(motion, along, joint_fit, entry)),
-            tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
+            tau_hat_unseen=at_samples(refit, motion) if refit else np.broadcast_to(np.nan, len(motion)),
+            unscored=unscored, **terms,
         )  # fmt: skip
-        yield model
+        yield from model.blocks()
         if is_fitted and fit == CHOSEN and not motion.at_rest:
             yield residual_of(model, periods.get(motion.joint))
 

@@ -1,0 +1,111 @@
+"""Long logs are read, filtered and written in blocks: the results are those of the whole, and the memory is bounded."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from davinci_forces.filters import FILTERS, filter_parts, tracker
+from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel
+from davinci_forces.identification import joint_models
+from davinci_forces.maths import arrays
+from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Regressor
+from davinci_forces.maths.signals import whiteness
+from davinci_forces.maths.uncertainty import error_band
+from davinci_forces.records import JointModel, PeriodResidual, store
+from tests.benchmarks.test_memory import hour_study, peak
+
+RATE, N, BLOCK = 1000.0, 3500, 1000  # the last block is shorter
+NOISE = NoiseModel(1e-4, 1e-3, 0.0, 1e-2, 0.05)
+BYTES = 155  # the most memory that a further sample of a joint takes, in any stage or the report
+
+
+@pytest.fixture
+def recording() -> FilterInput:
+    rng, t = np.random.default_rng(1), np.arange(N) / RATE
+    q, dq, ddq = np.sin(t), np.cos(t), -np.sin(t)
+    inertia, known = 0.4 + 0.1 * np.sin(3.0 * t), 0.2 * np.cos(t)
+    tau = inertia * ddq + 0.3 * dq + 0.2 * np.sign(dq) + known + 0.1 * rng.normal(size=N)
+    joint = JointDynamics(inertia, (0.0, 0.01, 0.0, 0.0, 0.3, 0.2, 0.0), known)
+    return FilterInput(joint, q + 1e-4 * rng.normal(size=N), dq + 1e-3 * rng.normal(size=N), ddq, tau, 1.0 / RATE, 0.1)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_filter_gives_the_same_bits_in_blocks_as_over_the_whole(monkeypatch, recording: FilterInput, name: str):
+    whole = tracker(name)(recording, NOISE)
+    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", BLOCK)
+    long = LongInput(N, recording.T_s, recording.initial_std, recording.part)
+    for column, expected in zip(filter_parts(name, [long], NOISE), whole, strict=True):
+        np.testing.assert_array_equal(column, expected)
+
+
+@pytest.mark.parametrize("period", [50.0, 1500.0])
+def test_samples_of_a_long_series_are_counted_in_blocks_as_over_the_whole(monkeypatch, period: float):
+    """Of two correlation times, one longer than a block."""
+    rng = np.random.default_rng(1)
+    x = np.sin(2 * np.pi * np.arange(20_000) / period) + rng.normal(size=20_000)
+    expected = error_band.count_uncorrelated(x)
+    monkeypatch.setattr(error_band, "BLOCK_SAMPLES", 256)
+    assert error_band.count_uncorrelated(x) == pytest.approx(expected, rel=1e-9)
+
+
+def test_correlations_of_a_long_series_are_those_of_the_whole(monkeypatch):
+    x, u = np.random.default_rng(1).standard_normal((2, N)) + 0.5
+    x[3:] += u[:-3]
+    expected = whiteness.cross_correlation(x, u, 20)
+    monkeypatch.setattr(whiteness, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_allclose(whiteness.cross_correlation(x, u, 20), expected, rtol=0.0, atol=1e-12)
+
+
+class Plane:
+    """A model of one joint with three parameters, none of them of friction with a memory."""
+
+    efforts, displacements = ("roll",), ()
+
+    def regressor(self, motion: ArmMotion) -> Regressor:
+        columns = np.column_stack([motion.q, np.sin(motion.dq), np.sign(motion.dq)])
+        return Regressor(columns[:, None], np.abs(motion.q[:, 0]) > 0.1)
+
+
+def test_a_refit_in_blocks_is_that_of_the_whole(monkeypatch):
+    rng = np.random.default_rng(1)
+    q, dq, ddq = rng.standard_normal((3, N, 1))
+    motion = ArmMotion(q, dq, ddq, 1.0 / RATE, np.zeros(N, np.int64))
+    along: Any = SimpleNamespace(
+        identified=SimpleNamespace(model=lambda fit: Plane()), motion=lambda fit, joint: motion
+    )
+    tau = Plane().regressor(motion).Phi[:, 0] @ np.array([3.0, -2.0, 0.5]) + 0.1 * rng.standard_normal(N)
+    joint: Any = SimpleNamespace(joint="roll", tau=tau, tau_hat=0.5 * tau)
+    free, fit = np.arange(N) % 7 > 0, cast("Any", None)
+    expected = joint_models.refit_effort(joint, fit, along, free)
+    assert np.std(expected - joint.tau_hat) > 0.1
+    monkeypatch.setattr(joint_models, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_allclose(joint_models.refit_effort(joint, fit, along, free), expected, rtol=1e-10, atol=1e-12)
+
+
+def test_a_part_of_a_long_record_is_lazy_and_has_its_rows(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(store, "BLOCK_SAMPLES", BLOCK)
+    t, q, dq, tau = np.random.default_rng(1).standard_normal((4, N))
+    record = PeriodResidual("log", "joint", t=t, q_noise=q, dq_noise=dq, tau_noise=tau)
+    with store.Writer(tmp_path, lambda record: lambda template: template, {}) as writer:
+        place = writer.write(record)
+    later = store.read(PeriodResidual, tmp_path, place, longest=1)
+    for rows in (slice(0, N), slice(900, 2100), slice(N - 1, N), slice(BLOCK, 2 * BLOCK)):
+        np.testing.assert_array_equal(later.part(rows).tau_noise, tau[rows])
+        np.testing.assert_array_equal(later.part(rows).part(slice(1, 5)).t, t[rows][1:5])
+        assert len(later.part(rows)) == len(t[rows])
+        assert "t" not in vars(later.part(rows))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="how much memory a process took is Linux's to say")
+def test_a_longer_log_takes_little_more_memory_through_all_stages(tmp_path: Path):
+    peaks = [peak("run", hour_study(tmp_path / str(minutes), minutes))[0] for minutes in (10, 20)]
+    for minutes in (10, 20):
+        place = store.path(JointModel, ("push", "hand_roll"))
+        model = store.read(JointModel, tmp_path / str(minutes) / "processed" / "lab", place, longest=1)
+        assert len(model) == minutes * 60_000
+    assert (peaks[1] - peaks[0]) * 2**20 / 600_000 < BYTES
