@@ -50,10 +50,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_a_file_of_each_kind_cut_at_every_other_byte_gives_whole_rows_or_a_clear_error",
     ),
     "report/test_report_figures.py": ("test_another_process_gives_the_same_bytes",),
-    "report/test_report_html.py": (
-        "test_a_dozen_long_traces_stay_under_five_megabytes",
-        "test_hundreds_of_small_figures_leave_room_and_each_takes_three_kilobytes",
-    ),
+    "report/test_report_html.py": ("test_a_dozen_long_traces_stay_under_five_megabytes",),
     "robot/test_rigid_body.py": (
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[6]",
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[7]",
@@ -150,9 +147,6 @@ SLOW: dict[str, dict[str, int]] = {
         "test_a_number_shows_its_key_and_an_address_finds_it": 0,
         "test_colours_follow_the_page_into_the_dark": 0,
         "test_the_contents_show_where_the_reader_is": 0,
-    },
-    "report/test_report_html.py": {
-        "test_hundreds_of_small_figures_leave_room_and_each_takes_three_kilobytes": 0,
     },
     "report/test_report_pdf.py": {
         "test_an_equation_stays_on_the_page_of_the_table_that_follows_it": 0,
@@ -304,9 +298,9 @@ SLOW: dict[str, dict[str, int]] = {
 # Files that take longest: they come first, so that no process ends long before the others, and no two that make the
 # same study are next to each other.
 FIRST = (
-    "contracts/test_sections.py", "test_runs.py", "simulation/test_closed_loop.py", "test_robustness.py",
-    "test_period.py", "contracts/test_estimators.py", "report/test_campaign.py", "test_faults.py", "test_consistent.py",
-    "guide/test_tutorials.py", "test_real_data.py", "test_parameter_errors.py",
+    "simulation/test_excitation_limits.py", "contracts/test_sections.py", "test_runs.py", "test_robustness.py",
+    "simulation/test_closed_loop.py", "test_period.py", "contracts/test_estimators.py", "report/test_campaign.py",
+    "test_faults.py", "test_consistent.py", "guide/test_tutorials.py", "test_real_data.py", "test_parameter_errors.py",
 )  # fmt: skip
 
 

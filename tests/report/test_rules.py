@@ -10,11 +10,10 @@ from davinci_forces.records import FrictionMap, Pose, Residual, Stiffness, Track
 from davinci_forces.report.sections.innovations import over_time
 from davinci_forces.report.sections.joints.friction import curves
 from davinci_forces.report.sections.joints.friction import in_words as friction_in_words
-from davinci_forces.report.sections.joints.residuals import direction_means, in_words, share_within_reversals
+from davinci_forces.report.sections.joints.residuals import in_words, motion_panel
 from davinci_forces.report.sections.noise import histogram
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot
 from davinci_forces.report.sections.robot import walk
-from davinci_forces.report.sections.tip import signed_text
 from davinci_forces.report.sections.tissue import spread, spread_panel, surface_map
 from tests.report.report_records import record
 
@@ -36,9 +35,9 @@ def residual(errors, dq) -> Residual:
 def test_an_error_around_reversals_is_told_by_its_ratio_to_the_error_elsewhere():
     dq = np.repeat([1.0, -1.0, 0.05, -0.05, 0.2], [40, 40, 5, 5, 10])
     errors = np.where(np.abs(dq) < 0.1, 3.0, 1.0) * np.tile([1.0, -1.0], 50)
-    assert share_within_reversals(errors, dq) == pytest.approx(3.0)
-    assert share_within_reversals(errors, np.ones(100)) == 1.0  # without a reversal nothing is told of one
-    assert share_within_reversals(np.zeros(100), dq) == 1.0
+    assert "residual's RMS is 3.0 times its RMS elsewhere" in in_words(residual(errors, dq), errors, None)
+    for x, motion in ((errors, np.ones(100)), (np.zeros(100), dq)):  # without a reversal, or an error
+        assert "Around reversals" not in in_words(residual(x, motion), x, None)
 
 
 @pytest.mark.parametrize(("ratio", "remarked"), [(1.5, False), (2.5, True)])
@@ -60,10 +59,14 @@ def test_a_residual_follows_the_velocity_where_a_tenth_of_its_variance_does(shar
 
 
 def test_the_mean_of_each_direction_reaches_to_its_largest_velocity():
-    backwards, forwards = direction_means(np.array([-2.0, -1.0, 0.0, 1.0, 3.0]), np.array([1.0, 3.0, 9.0, -1.0, -3.0]))
+    dq, errors = np.array([-2.0, -1.0, 0.0, 1.0, 3.0]), np.array([1.0, 3.0, 9.0, -1.0, -3.0])
+    _, backwards, forwards = motion_panel(residual(errors, dq), errors, dq, "velocity", True).marks
     assert_allclose([backwards.x, backwards.y], [[0.0, -2.0], [2.0, 2.0]])
     assert_allclose([forwards.x, forwards.y], [[0.0, 3.0], [-2.0, -2.0]])
-    assert next(direction_means(np.ones(2), np.ones(2))).y[0] == 1.0
+    _, only = motion_panel(
+        residual(np.ones(2), np.array([1.0, 2.0])), np.ones(2), np.array([1.0, 2.0]), "v", True
+    ).marks
+    assert only.y[0] == 1.0
 
 
 def friction(model: str) -> FrictionMap:
@@ -117,10 +120,6 @@ def test_a_plot_of_an_autocorrelation_shows_all_of_it_and_both_sides_of_zero(lar
     assert low <= -0.08 < 0.08 <= high  # four bands, so that the band is seen to be one
     stems = autocorrelation(w, "").marks[-1]
     assert_allclose([stems.x, stems.y], [[1, 2], [largest, smallest]])
-
-
-def test_a_component_that_is_printed_as_zero_has_no_sign():
-    assert [signed_text(x, 1) for x in (-0.04, 0.0, -0.06, 0.26)] == ["0.0", "0.0", "−0.1", "0.3"]
 
 
 def places(pushes: int = 8, **columns) -> Stiffness:
