@@ -180,14 +180,14 @@ def _rows_of(kind: type[Record], whole: Path, name: str, which: slice) -> np.nda
 
 def release() -> None:
     """Return to the system the memory that the C library retains after a task."""
-    with suppress(OSError, AttributeError):  # only glibc has this function
+    with suppress(OSError, AttributeError, TypeError):  # glibc alone has it, and on Windows nothing is loaded by None
         CDLL(None).malloc_trim(0)
 
 
 def _return_columns() -> None:
     """Have the memory of a long column returned to the system as soon as it is free."""
     pa.set_memory_pool(pa.system_memory_pool())
-    with suppress(OSError, AttributeError):
+    with suppress(OSError, AttributeError, TypeError):
         CDLL(None).mallopt(MMAP_THRESHOLD, MAX_HEAP_BYTES)
         CDLL(None).mallopt(TRIM_THRESHOLD, MAX_TOP_BYTES)
 
