@@ -64,9 +64,9 @@ class Piece(NamedTuple):
     place: slice  # samples of the part in the whole motion
 
 
-def pieces(model: Model, motion: ArmMotion, beside: int = 0, samples: int = PIECE_SAMPLES) -> Iterator[Piece]:
-    """Yield a motion in parts of these samples, each with up to `beside` more samples before and after."""
-    N = len(motion.q)
+def pieces(model: Model, motion: ArmMotion, beside: int = 0, samples: int = 0) -> Iterator[Piece]:
+    """Yield a motion in parts of `samples`, or of `PIECE_SAMPLES`, with up to `beside` more before and after each."""
+    N, samples = len(motion.q), samples or PIECE_SAMPLES
     if samples < N:
         motion = motion._replace(memory={key: deflection(motion, *key) for key in model.displacements})
     for start in range(0, N, samples):
