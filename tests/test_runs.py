@@ -254,7 +254,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
         [line] = [line for line in said.splitlines() if line.startswith(f"{stage}: ")]
         assert line.endswith(" up to date"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
-    assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
+    assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed; 3 more such reasons$", said, re.M), said
     assert re.search(r"^report: the code of records/prediction.py changed", said, re.M), said
 
 

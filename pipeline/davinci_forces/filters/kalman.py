@@ -164,5 +164,6 @@ def _pass(
                 P[i, j], P[j, i] = p, p
         P[1, 1] += friction_var
     adapted[0], adapted[1], adapted[2], adapted[3] = R_q, R_dq, C_q, C_dq
-    state[:] = x
+    for i in range(n):  # a slice would bring the compiler's functions for texts of errors
+        state[i] = x[i]
     return total

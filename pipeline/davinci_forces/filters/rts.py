@@ -25,7 +25,7 @@ STORED = 15  # numbers stored per sample: its prediction, and the transition to 
 
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     """Smooth a recording block by block, the last one first; the forward pass of the others is computed again."""
-    starts, after = list[tuple[slice, Any]](), np.zeros(0)
+    starts, after = list[tuple[slice, Any]](), np.zeros(9)
     for rows, before, innovations, stored in forwards(recording, noise):
         starts.append((rows, before))
         last = innovations, stored
@@ -34,7 +34,8 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
             last = _forwards_from(before, recording.part(rows), noise)[1:]
         innovations, stored = last
         out = np.empty((4, rows.stop - rows.start))
-        after = _backwards(stored, noise.r_q**2, noise.r_dq**2, after, *out, *innovations[:2])
+        is_last = rows.stop == recording.samples
+        _backwards(stored, noise.r_q**2, noise.r_dq**2, is_last, after, *out, *innovations[:2])
         yield rows, Tracked(*out, *innovations)
 
 
@@ -75,18 +76,15 @@ def _forwards(
 
 @compile_and_store
 def _backwards(
-    stored: Array, R_q: float, R_dq: float, after: Any, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any,
-    i_dq: Any,
-) -> Any:  # fmt: skip
-    """Run backwards from `after`: l~ and L~ of the next sample (9,), or nothing after the last sample."""
-    l1, l2, l3 = 0.0, 0.0, 0.0
-    L11, L12, L13, L22, L23, L33 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if len(after):
-        l1, l2, l3 = after[0], after[1], after[2]
-        L11, L12, L13, L22, L23, L33 = after[3], after[4], after[5], after[6], after[7], after[8]
+    stored: Array, R_q: float, R_dq: float, is_last: bool, after: Any, out_q: Any, out_dq: Any, out_tau: Any,
+    out_std: Any, i_q: Any, i_dq: Any,
+) -> None:  # fmt: skip
+    """Run backwards from l~ and L~ of the next sample, `after` (9,), or from 0 in the last block; `after` changes."""
+    l1, l2, l3 = after[0], after[1], after[2]
+    L11, L12, L13, L22, L23, L33 = after[3], after[4], after[5], after[6], after[7], after[8]
     for k in range(len(i_q) - 1, -1, -1):
         row = stored[k]
-        if k < len(i_q) - 1 or len(after):
+        if k < len(i_q) - 1 or not is_last:
             f11, f12, f13, f21, f22, f23 = row[9], row[10], row[11], row[12], row[13], row[14]
             l1, l2, l3 = f11 * l1 + f21 * l2, f12 * l1 + f22 * l2, f13 * l1 + f23 * l2 + l3
             # L~ F, then F' L~ F
@@ -115,4 +113,5 @@ def _backwards(
         out_tau[k] = row[2] - c * l1 - e * l2 - f * l3
         reduction = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
         out_std[k] = max(f - reduction, MIN_VARIANCE_SHARE * f) ** 0.5
-    return np.array([l1, l2, l3, L11, L12, L13, L22, L23, L33])
+    after[0], after[1], after[2] = l1, l2, l3
+    after[3], after[4], after[5], after[6], after[7], after[8] = L11, L12, L13, L22, L23, L33
