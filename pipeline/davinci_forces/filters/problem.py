@@ -103,11 +103,11 @@ BlockFilter = Callable[[Recording, NoiseModel], Iterator[Block]]  # blocks(recor
 
 def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked._fields) -> Tracked:
     """Join the blocks of N samples; columns that are not named are empty."""
-    asked = {name: np.empty(N) for name in names}
+    columns = {name: np.empty(N) for name in names}
     for rows, tracked in blocks:
-        for name, column in asked.items():
+        for name, column in columns.items():
             column[rows] = getattr(tracked, name)
-    return Tracked(**{name: asked.get(name, np.empty(0)) for name in Tracked._fields})
+    return Tracked(**{name: columns.get(name, np.empty(0)) for name in Tracked._fields})
 
 
 def whole(blocks: BlockFilter) -> Filter:

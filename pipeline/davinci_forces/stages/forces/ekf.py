@@ -68,23 +68,15 @@ def track_effort(
         # At standstill, friction is anywhere between its static levels: a uniform distribution.
         friction = part.standing * part.static_friction**2 / 3.0
         model_variance = np.maximum(variance[rows] - own[rows] ** 2, 0.0)
-        yield Track(
-            log=model.log,
-            joint=model.joint,
-            model=model.model,
-            estimator=model.estimator,
+        yield Track.like(
+            model,
             filter=DEFAULT,
-            role=model.role,
-            path=model.path,
-            at_rest=model.at_rest,
-            rate=model.rate,
             r_q=noise.r_q,
             r_dq=noise.r_dq,
             q_dq=noise.q_dq,
             q_tau=noise.q_tau * model.rate**0.5,
             day_offset=offset.value,
             day_offset_std=offset.std,
-            static_friction=model.static_friction,
             band_from=source,
             **numbers,
             t=part.t,

@@ -24,11 +24,8 @@ def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float, de
 
 def tuning(model: JointModel, before: NoiseModel, delay: float) -> Tuning:
     """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
-    parts, T_s, inertia = (
-        [part.part(slice(0, part.samples)) for part in filter_inputs(model)],
-        1.0 / model.rate,
-        float(model.inertia.max()),
-    )
+    parts = [part.part(slice(0, part.samples)) for part in filter_inputs(model)]
+    T_s, inertia = 1.0 / model.rate, float(model.inertia.max())
     noise = tune_noise(parts, before, inertia, model.viscous, delay)
     initial, final = (
         sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
