@@ -185,7 +185,7 @@ def test_each_effect_that_a_simulation_put_in_has_its_term_with_its_value_or_non
     friction = {"lab": {"hand_roll": dict.fromkeys(parameters, 0.25)}, "another": {"hand_roll": {}}}
     logs = [{"name": log, "family": "lab"} for fit in full.own_fits() for log in fit.logs]
     study = replace(full.study, truth={"friction": friction, "log": logs})
-    [table] = [block for block in ground_truth.blocks(replace(full, study=study)) if isinstance(block, Table)]
+    [table] = [block for block in ground_truth.section(replace(full, study=study)).blocks if isinstance(block, Table)]
     rows = {(row[1], row[3]): row[4] for row in table.rows}
     estimate = rows["viscous friction", "viscous friction"]
     names = dict(ground_truth.used_parameters(full, "hand_roll"))

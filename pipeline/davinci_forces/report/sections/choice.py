@@ -25,7 +25,7 @@ from davinci_forces.report.sections.parts import MEASURES, paper_or_screen, run_
 MAX_RUNS_ON_PAPER = 9
 
 
-@section_of(Choice, "Choice of the model", "choice")
+@section_of("Choice of the model", "choice", Choice)
 def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
     """The choice with its scores, and its error on unseen logs."""
     choice = choices[0]

@@ -16,25 +16,19 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Section,
     Table,
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import run_cells
+from davinci_forces.report.sections.parts import run_cells, section_of
 from davinci_forces.study import LogEntry
 
 PRINTED = 20  # contacts of the PDF at most
 
 
-def section(context: Context) -> Section | None:
+@section_of("Contacts", "contacts")
+def section(context: Context) -> Iterator[Block]:
     """All contact windows, and the recordings that were not analysed."""
-    content = tuple(blocks(context))
-    return Section("Contacts", "contacts", content) if content else None
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
     contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(

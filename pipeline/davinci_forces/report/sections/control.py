@@ -3,22 +3,19 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Control, Lyapunov
-from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict
+from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Table, Verdict
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import section_of
 from davinci_forces.robots.robot import ControlStudy
 
 SHARE_DRAWN = 0.5  # of a study's time, in which it settles
 
 
-def section(context: Context) -> Section | None:
-    """Simulations of the robot's controllers; None if there are none."""
-    names = {run.controller for run in context.catalogue.records(Control)}
+@section_of("Control, in simulation", "control", Control)
+def section(context: Context, runs: list[Control]) -> Iterator[Block]:
+    """Simulations of the robot's controllers.  Fig 5.2-5.6"""
+    names = {run.controller for run in runs}
     studies = [study for study in context.study.robot.control if study.name in names]
-    return Section("Control, in simulation", "control", tuple(blocks(context, studies))) if studies else None
-
-
-def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
-    """The section's content.  Fig 5.2-5.6"""
     exact = [study for study in studies if study.known_masses == 1.0]
     light, thesis = [study for study in studies if study.known_masses != 1.0], context.compares_with_thesis
     yield Prose(

@@ -10,7 +10,7 @@ from davinci_forces.report.sections.parts import section_of
 SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, corrected", "found": "designed here"}
 
 
-@section_of(Excitation, "Excitation", "excitation")
+@section_of("Excitation", "excitation", Excitation)
 def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     """Objectives and limits of every trajectory.  Fig 6.5, Table 6.1"""
     yield Prose(

@@ -15,12 +15,11 @@ from davinci_forces.report.content import (
     Panel,
     Points,
     Prose,
-    Section,
     Table,
     literal,
 )
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import run_cells
+from davinci_forces.report.sections.parts import run_cells, section_of
 
 SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
 DRAWN = {
@@ -31,17 +30,9 @@ DRAWN = {
 }
 
 
-def section(context: Context) -> Section | None:
-    """Tuning, error budget and comparison; None if no run was tracked."""
-    content = tuple(blocks(context))
-    return Section("The filter", "filters", content) if content else None
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
-    noises = context.catalogue.records(FilterNoise)
-    if not noises:
-        return
+@section_of("The filter", "filters", FilterNoise)
+def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
+    """Tuning, error budget and comparison."""
     yield Prose(
         "The filter assumes noise of position, velocity and effort. The standard deviations of this noise maximise the "
         "likelihood of the innovations (each measurement minus its prediction) in identification logs, where nothing "

@@ -15,14 +15,13 @@ from davinci_forces.report.content import (
     Line,
     Panel,
     Prose,
-    Section,
     Table,
     Verdict,
     literal,
 )
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import first_on_paper, run_name
+from davinci_forces.report.sections.parts import first_on_paper, run_name, section_of
 from davinci_forces.report.verdicts import truth_level
 
 PUSH_SHAPES = {
@@ -45,13 +44,11 @@ COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
 
-def section(context: Context) -> Section | None:
+@section_of("Comparison with ground truth", "truth")
+def section(context: Context) -> Iterator[Block]:
     """Parameters and external efforts, estimated and true; only of a simulated study."""
-    return Section("Comparison with ground truth", "truth", tuple(blocks(context))) if context.study.truth else None
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
+    if not context.study.truth:
+        return
     yield Prose(
         "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
         "analysis reads it. This section compares external efforts with it, and parameters where the filter's model "

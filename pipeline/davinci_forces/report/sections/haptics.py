@@ -24,7 +24,7 @@ from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
 
-@section_of(HapticRun, "Haptic loop, simulated", "haptics")
+@section_of("Haptic loop, simulated", "haptics", HapticRun)
 def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The haptic loop.  Section 8.4"""
     responses = context.catalogue.records(HapticResponse)

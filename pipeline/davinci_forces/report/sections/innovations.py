@@ -33,7 +33,7 @@ PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
-@section_of(Explanation, "Innovations", "innovations")
+@section_of("Innovations", "innovations", Explanation)
 def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The verdict on every run, figures of the worst run of each joint, and every test on demand."""
     yield Prose(

@@ -1,6 +1,7 @@
 """The methods behind the numbers, with their equations."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from textwrap import fill
 
@@ -9,7 +10,7 @@ from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import trust
+from davinci_forces.report.sections.parts import section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
 SYMBOLS = (
@@ -163,23 +164,20 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
 )  # fmt: skip
 
 
-def section(context: Context) -> Section:
+@section_of("Methods", "methods")
+def section(context: Context) -> Iterator[Block]:
     """Prose and equations in the order of the stages; symbols, thresholds, a paragraph for a paper, and references."""
-    symbols = Table(
-        "Symbols.", ("Symbol", "Is", "Unit"), tuple((s, m, u or "–") for s, m, u in SYMBOLS), "symbols", "lll"
-    )
-    limits = Table(
-        "The thresholds of the verdicts of this report.",
-        ("Quantity", "Measure", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
-    )  # fmt: skip
-    text = (Listing(paragraph_for_paper(context)),) if context.own_fits() else ()
-    paragraph = (Section("A paragraph for a paper", "paragraph", text),) if text else ()
-    references = Section("References", "references", (Bullets(tuple(map(reference, ENTRY.findall(bibliography())))),))
-    settings = context.study.settings
-    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
-    made = (block for kind, method in METHODS if context.catalogue.records(kind) for block in method)
-    methods = (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in made)
-    return Section("Methods", "methods", (*methods, limits, symbols, *paragraph, references))
+    words = {"lowpass": f"{context.study.settings.lowpass:g}", "in_current": in_current(context)}
+    for block in (block for kind, method in METHODS if context.catalogue.records(kind) for block in method):
+        yield Prose(block.text.format(**words)) if isinstance(block, Prose) else block
+    header = ("Quantity", "Measure", "Good", "Caution", "Problem")
+    yield Table("The thresholds of the verdicts of this report.", header, thresholds(), "thresholds", "lllll")
+    symbols = tuple((symbol, meaning, unit or "–") for symbol, meaning, unit in SYMBOLS)
+    yield Table("Symbols.", ("Symbol", "Is", "Unit"), symbols, "symbols", "lll")
+    if context.own_fits():
+        yield Section("A paragraph for a paper", "paragraph", (Listing(paragraph_for_paper(context)),))
+    references = tuple(map(reference, ENTRY.findall(bibliography())))
+    yield Section("References", "references", (Bullets(references),))
 
 
 def bibliography() -> str:

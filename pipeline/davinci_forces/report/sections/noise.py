@@ -27,7 +27,7 @@ NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "eff
 MAX_BARS = 24  # periods in the bar plot
 
 
-@section_of(Average, "Averaging and noise", "noise")
+@section_of("Averaging and noise", "noise", Average)
 def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     """A table of standard deviations, the tests of the noise, and the noise that averaging removed from each log."""
     yield Prose(

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -46,19 +46,20 @@ MEASURES = (
 )
 
 
-R = TypeVar("R", bound=Record)
-
-
 def section_of(
-    kind: type[R], heading: str, anchor: str
-) -> Callable[[Callable[[Context, list[R]], Iterator[Block]]], Callable[[Context], Section | None]]:
-    """Turn a function that yields blocks about records of a kind into a section; None if there are no such records."""
+    heading: str, anchor: str, *kinds: type[Record]
+) -> Callable[[Callable[..., Iterator[Block]]], Callable[[Context], Section | None]]:
+    """Turn a function that yields blocks, from the context and the records of kinds, into the function of a section.
 
-    def decorate(blocks: Callable[[Context, list[R]], Iterator[Block]]) -> Callable[[Context], Section | None]:
+    There is no section where a kind has no records, or where there are no blocks.
+    """
+
+    def decorate(blocks: Callable[..., Iterator[Block]]) -> Callable[[Context], Section | None]:
         @wraps(blocks)
         def section(context: Context) -> Section | None:
-            records = context.catalogue.records(kind)
-            return Section(heading, anchor, tuple(blocks(context, records))) if records else None
+            records = [context.catalogue.records(kind) for kind in kinds]
+            content = tuple(blocks(context, *records)) if all(records) else ()
+            return Section(heading, anchor, content) if content else None
 
         return section
 

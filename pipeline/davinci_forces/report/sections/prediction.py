@@ -19,7 +19,7 @@ from davinci_forces.report.sections.parts import (
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
 
-@section_of(Prediction, "Prediction", "prediction")
+@section_of("Prediction", "prediction", Prediction)
 def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
     yield Prose(

@@ -5,20 +5,16 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 from davinci_forces.records import KINDS, LogSummary
-from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
+from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import paper_or_screen
+from davinci_forces.report.sections.parts import paper_or_screen, section_of
 
 PER_LINE = 4  # settings
 
 
-def section(context: Context) -> Section:
+@section_of("Provenance", "provenance")
+def section(context: Context) -> Iterator[Block]:
     """Everything needed to check whether a report comes from these files and this code."""
-    return Section("Provenance", "provenance", tuple(blocks(context)))
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
     provenance, study = context.provenance, context.study
     yield Prose(
         f"Made by davinci-forces {provenance.version}; the SHA-256 of its files begins with {provenance.code}. The "

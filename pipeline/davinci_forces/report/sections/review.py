@@ -3,19 +3,17 @@
 from collections.abc import Iterator
 from hashlib import sha256
 
-from davinci_forces.report.content import Block, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.content import Block, Prose, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import RATINGS, paper_or_screen
+from davinci_forces.report.sections.parts import RATINGS, paper_or_screen, section_of
 from davinci_forces.study.review import STUDY, Rating
 
 
-def section(context: Context) -> Section | None:
-    """The ratings that the study holds in review.toml."""
-    return Section("Ratings", "review", tuple(blocks(context))) if context.ratings else None
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """Whether the ratings are still valid, and a table of them."""
+@section_of("Ratings", "review")
+def section(context: Context) -> Iterator[Block]:
+    """Whether the ratings in review.toml are still valid, and a table of them."""
+    if not context.ratings:
+        return
     now = sha256(context.results.json()).hexdigest()
     old = [rating for rating in context.ratings if rating.results != now]
     yield Prose(

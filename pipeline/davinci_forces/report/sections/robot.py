@@ -12,7 +12,7 @@ from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of
 
 
-@section_of(Links, "The robot", "robot")
+@section_of("The robot", "robot", Links)
 def section(context: Context, records: list[Links]) -> Iterator[Block]:
     """The chain and its table.  Tables 3.1, 4.2, Fig 3.5"""
     links, worst = records[0], context.results["robot.worst_condition"].number(3)

@@ -14,7 +14,6 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     Table,
     Verdict,
     literal,
@@ -27,6 +26,7 @@ from davinci_forces.report.sections.parts import (
     paper_or_screen,
     run_cells,
     run_name,
+    section_of,
 )
 from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
@@ -35,13 +35,11 @@ ON_PAPER = 2  # joints whose worst run is drawn in the PDF
 LEVELS = ("free_rms", "detection_level")
 
 
-def section(context: Context) -> Section | None:
+@section_of("Runs", "runs")
+def section(context: Context) -> Iterator[Block]:
     """The recordings, a table of all tracks, the worst run of each joint, and every run on demand."""
-    content = (
-        *recording_blocks(context, context.catalogue.records(LogSummary)),
-        *track_blocks(context, context.catalogue.records(Track)),
-    )
-    return Section("Runs", "runs", content) if content else None
+    yield from recording_blocks(context, context.catalogue.records(LogSummary))
+    yield from track_blocks(context, context.catalogue.records(Track))
 
 
 def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:

@@ -24,7 +24,7 @@ PUBLISHED_ERROR = 0.0307  # root mean square error over range of a neural networ
 VECTOR = "vector"  # the axis that stands for all three
 
 
-@section_of(SensorForce, "Against a force sensor", "sensor")
+@section_of("Against a force sensor", "sensor", SensorForce)
 def section(context: Context, forces: list[SensorForce]) -> Iterator[Block]:
     """A table of all logs with a sensor and of the best published error for this arm, and both forces over time."""
     yield Prose(

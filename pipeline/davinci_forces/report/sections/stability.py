@@ -46,7 +46,7 @@ ROWS = (
 LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst switching", "vermillion"), "at contact": ("contact", "blue")}
 
 
-@section_of(HandLimit, "Stability of haptic feedback", "stability")
+@section_of("Stability of haptic feedback", "stability", HandLimit)
 def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     """The stability limits of each simulated hand.  Section 8.3"""
     tissues = [tissue for tissue in context.catalogue.records(Stiffness) if tissue.pushes and tissue.stiffness > 0.0]

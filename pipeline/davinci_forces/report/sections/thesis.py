@@ -2,21 +2,19 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.report.content import Block, Prose, Section, Table, literal
+from davinci_forces.report.content import Block, Prose, Table, literal
 from davinci_forces.report.context import Context
+from davinci_forces.report.sections.parts import section_of
 from davinci_forces.simulation.thesis import chapters, in_words, numbers
 
 STUDY = "davinci-thesis"  # of the thesis's identification
 
 
-def section(context: Context) -> Section | None:
-    """The index of the thesis; None for recordings and other simulations."""
-    compares = context.compares_with_thesis
-    return Section("The thesis, chapter by chapter", "thesis", tuple(blocks(context))) if compares else None
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """A table for each chapter, and one of the printed numbers."""
+@section_of("The thesis, chapter by chapter", "thesis")
+def section(context: Context) -> Iterator[Block]:
+    """A table for each chapter, and one of the printed numbers; only in simulations of the thesis's experiments."""
+    if not context.compares_with_thesis:
+        return
     of_thesis = context.study.truth.get("scenario") == STUDY
     results = {key: (result.value, result.std or 0.0) for key, result in context.results.items() if of_thesis}
     compared = numbers(results)

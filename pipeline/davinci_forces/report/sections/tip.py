@@ -42,7 +42,7 @@ SPACING = 0.2  # [s] between the vectors that are drawn in a contact
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
 
-@section_of(TipForce, "Force at the tip", "tip")
+@section_of("Force at the tip", "tip", TipForce)
 def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The force at the tip of every log in which all joints that carry it move."""
     yield Prose(

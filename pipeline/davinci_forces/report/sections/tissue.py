@@ -38,7 +38,7 @@ CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
 WAYS: tuple[tuple[int, str, Colour], ...] = ((1, "in", "blue"), (0, "out", "orange"))
 
 
-@section_of(Stiffness, "Tissue", "tissue")
+@section_of("Tissue", "tissue", Stiffness)
 def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     """All tissue logs."""
     yield from (verdict(context, tissue) for tissue in tissues)

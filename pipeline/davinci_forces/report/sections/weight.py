@@ -13,24 +13,24 @@ from davinci_forces.report.content import (
     OnScreen,
     Panel,
     Prose,
-    Section,
     Table,
     Verdict,
     literal,
 )
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import run_cells
+from davinci_forces.report.sections.parts import run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, mass_level, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
 
-def section(context: Context) -> Section | None:
+@section_of("Attached masses", "weight")
+def section(context: Context) -> Iterator[Block]:
     """The masses of all weight logs in a table, then each log in detail."""
     weights, constants = context.catalogue.records(Weight), context.catalogue.records(TorqueConstant)
     if not weights and not constants:
-        return None
-    intro = Prose(
+        return
+    yield Prose(
         "A mass on a link adds gravity and inertia to the effort of the joints. The mass is estimated as the slope of "
         "a line: the external effort of all moving joints that carry it, against the effort that 1 kg causes according "
         "to the robot's chain. The external effort is measured minus modelled effort, low-passed without delay. Each "
@@ -40,14 +40,16 @@ def section(context: Context) -> Section | None:
         "It is increased if logs without a mass give a mass that its standard error does not explain, or if the masses "
         "that the joints give differ."
     )
-    content: list[Block] = [intro, *([summary(context, weights)] if weights else [])]
-    content += (verdict(context, weight) for weight in weights)
-    content += [torque_constants(context, constants)] if constants else []
-    content += log_blocks(context, weights[0]) if weights else ()
+    if weights:
+        yield summary(context, weights)
+    yield from (verdict(context, weight) for weight in weights)
+    if constants:
+        yield torque_constants(context, constants)
+    for weight in weights[:1]:
+        yield from log_blocks(context, weight)
     if weights[1:]:
         others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
-        content.append(OnScreen("The other runs with a mass", "other-masses", others))
-    return Section("Attached masses", "weight", tuple(content))
+        yield OnScreen("The other runs with a mass", "other-masses", others)
 
 
 def summary(context: Context, weights: list[Weight]) -> Table:

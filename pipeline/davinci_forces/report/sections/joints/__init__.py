@@ -29,32 +29,31 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name
+from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
 
 SIGNED_FRICTION = ("Coulomb friction", "presliding friction", "smooth friction")  # with the sign of the velocity
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
 
 
-def section(context: Context) -> Section | None:
+@section_of("Joints", "joints")
+def section(context: Context) -> Iterator[Block]:
     """One subsection per joint: the model that was used, then all fits beside it."""
     fits = context.own_fits()
     if not fits:
-        return None
-    joints = dict.fromkeys(fit.group for fit in fits)
-    parts = [
-        Section(title(joint), f"fit-{joint}", tuple(joint_blocks(context, [f for f in fits if f.group == joint])))
-        for joint in joints
-    ]
-    if links := link_parameters(context, list(joints)):
-        parts.append(Section("Links", "fit-links", links))
-    intro = Prose(
+        return
+    yield Prose(
         "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
         "two parts. The part from noise follows from the differences between periods. The part from the model is the "
         "change of the value if blocks of path are left out, or if the friction is modelled otherwise. $z$ is the "
         "value over its standard error, both parts together. If $abs(z) < 2$, the parameter may be zero."
     )
-    return Section("Joints", "joints", (intro, *parts))
+    joints = list(dict.fromkeys(fit.group for fit in fits))
+    for joint in joints:
+        content = joint_blocks(context, [fit for fit in fits if fit.group == joint])
+        yield Section(title(joint), f"fit-{joint}", tuple(content))
+    if links := link_parameters(context, joints):
+        yield Section("Links", "fit-links", links)
 
 
 def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
