@@ -226,7 +226,7 @@ def test_a_study_may_say_how_its_base_is_mounted(tmp_path):
     roll, _, slide = made.robot.joints
     assert {"gravity, sine", "gravity, cosine"}.isdisjoint(term.name for term in roll.terms)  # it lies along gravity
     assert [term.name for term in slide.terms] == ["inertia", "offset", "viscous friction", "Coulomb friction"]
-    assert roll.printed is None
+    assert roll.printed == ()
     assert made.changed == {"base": {"rpy": [1.5707963267948966, 0.0, 0.0]}}
     upright = read(tmp_path, GOOD.replace('"davinci"', '"davinci"\nbase = { rpy = [0.0, 0.0, 2.0] }'))
     assert upright.robot.joints == robots.load("davinci", tmp_path).joints

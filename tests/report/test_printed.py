@@ -1,4 +1,4 @@
-"""Tables of the thesis beside this study's, and pictures of what estimators, swarms and friction maps found."""
+"""Pictures of what estimators, swarms and friction maps found."""
 
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -8,12 +8,12 @@ import pytest
 
 from davinci_forces.records import Fit, FrictionMap, Origin, Residual, SwarmSearch
 from davinci_forces.records.catalogue import Catalogue
-from davinci_forces.report.content import Bullets, Line, Table
+from davinci_forces.report.content import Line
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
-from davinci_forces.report.sections.joints.estimators import convergence, estimators, printed_beside
+from davinci_forces.report.sections.joints.estimators import convergence, estimators
 from davinci_forces.report.sections.joints.friction import friction_maps
-from davinci_forces.robots import davinci, dvrk_psm
+from davinci_forces.robots import davinci
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
@@ -25,36 +25,18 @@ def records():
     return list(fit.run([trajectory(arm.signal("hand_pitch"))], [], davinci.ROBOT, lowpass=17.0))
 
 
-def context(records, robot=davinci.ROBOT) -> Context:
+def context(records) -> Context:
     for record in records:
         object.__setattr__(
             record, "origin", Origin("x.parquet", "", dict.fromkeys((f.name for f in fields(record)), ""))
         )
     catalogue = Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])
-    study = SimpleNamespace(robot=robot, simulated=True, truth={"scenario": "davinci-demo"})
+    study = SimpleNamespace(robot=davinci.ROBOT)
     return Context(catalogue, study, collect(catalogue), None)
 
 
 def plain(records) -> Fit:
     return next(r for r in records if isinstance(r, Fit) and r.estimator == "lse")
-
-
-def test_every_parameter_is_printed_beside_what_is_found(records):
-    about = context(records)
-    blocks = list(printed_beside(about, plain(records)))
-    (table,) = [block for block in blocks if isinstance(block, Table)]
-    assert table.header == (
-        "Parameter", "Unit", "Guess, printed", "here", "WLSE, printed", "here", "LSE, printed", "here", "PSO, printed",
-        "here",
-    )  # fmt: skip
-    by_name = {row[0]: row[2:] for row in table.rows}
-    assert [by_name["gravity, cosine"][i] for i in (0, 2, 4, 6)] == ["0.115", "0.064", "0.0705", "0.0704"]
-    assert [by_name["mean squared error"][i] for i in (0, 2, 4, 6)] == ["2.9145", "0.0461", "0.046", "0.046"]
-    found = by_name["gravity, cosine"][5]
-    assert found.key == "fit.hand_pitch.independent.lse.gravity_cosine"
-    assert found.value == about.results[found.key].value
-    (misprints,) = [block for block in blocks if isinstance(block, Bullets)]
-    assert any("should be about 0.070" in text for text in misprints.items)
 
 
 def test_a_guess_that_rounding_leaves_of_nothing_is_nothing():
@@ -63,25 +45,6 @@ def test_a_guess_that_rounding_leaves_of_nothing_is_nothing():
     assert results["guess.instrument_slide.inertia"].value == 0.0
     prior, lse = (results[f"fit.instrument_slide.independent.{name}.mse"].value for name in ("prior", "lse"))
     assert prior < 1.1 * lse
-
-
-@pytest.mark.parametrize(
-    "robot",
-    [
-        dvrk_psm.ROBOT,
-        replace(davinci.ROBOT, joints=tuple(replace(joint, effort="A") for joint in davinci.ROBOT.joints)),
-    ],
-    ids=["another robot", "effort in A"],
-)
-def test_nothing_is_printed_beside_what_it_is_not_of(records, robot):
-    assert list(printed_beside(context(records, robot), plain(records))) == []
-
-
-def test_nothing_of_the_thesis_is_beside_a_user_s_study(records):
-    about = context(records)
-    about.study.truth = {}
-    assert not about.compares_with_thesis
-    assert list(printed_beside(about, plain(records))) == []
 
 
 def test_estimators_are_drawn_over_the_averaged_effort_and_as_differences(records):

@@ -13,7 +13,7 @@ PERIODS = 10
 
 
 def printed_mse(joint) -> float:
-    return next(column.mse for column in joint.printed.columns if column.estimator == "lse")
+    return next(column.mse for column in joint.printed if column.estimator == "lse")
 
 
 def test_a_sample_has_the_variance_of_ten_periods_mean_ten_times():

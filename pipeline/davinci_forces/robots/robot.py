@@ -64,14 +64,6 @@ class PrintedColumn(NamedTuple):
     mse: float  # mean squared error of the averaged effort
 
 
-class Printed(NamedTuple):
-    """The table of a publication that states a joint's parameters, and descriptions of its misprints."""
-
-    name: str
-    columns: tuple[PrintedColumn, ...]
-    misprints: tuple[str, ...]
-
-
 @dataclass(frozen=True)
 class Joint:
     """One joint: motor (Table 6.3), terms of its model (6.7-6.14), limits, and settings of excitation and filter."""
@@ -91,7 +83,7 @@ class Joint:
     # 0 selects the slowest walk that shows a push.  It is a choice, not a measurement, as the report states.
     q_tau: float = 0.0
     physical: PhysicalTable | None = None  # physical parameters behind its terms, if known
-    printed: Printed | None = None  # published parameters of its terms
+    printed: tuple[PrintedColumn, ...] = ()  # published parameters of its terms
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
@@ -179,7 +171,7 @@ class Robot:
         if math.isclose(z, 1.0, rel_tol=0, abs_tol=1e-12):
             return self
         joints = zip(self.joints, rigid_body.loaded_by_gravity(chain)[: len(self.joints)], strict=True)
-        turned = (replace(j, terms=j.terms_under_gravity(loaded), physical=None, printed=None) for j, loaded in joints)
+        turned = (replace(j, terms=j.terms_under_gravity(loaded), physical=None, printed=()) for j, loaded in joints)
         return replace(self, chain=chain, joints=tuple(turned))
 
     def tip(self, q: ArrayLike) -> Array:

@@ -221,14 +221,13 @@ def parameters(joint: Joint) -> dict[str, Array]:
     MSE(theta) = MSE_LSE + d' (F' F / K) d, d = theta - theta_LSE, for the printed excitation without its misprints.
     """
     assert joint.physical is not None
-    assert joint.printed is not None
     lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
     assert lumping is not None
     guess = lumping.theta(np.array([x.guess for x in joint.physical.parameters]))
     F = fourier.observation(joint.terms, trajectory(joint, joint.published[-1][0]))
-    columns = {column.estimator: column for column in joint.printed.columns}
+    columns = {column.estimator: column for column in joint.printed}
     least = columns["lse"]
-    d = np.array([np.subtract(column.theta, least.theta) for column in joint.printed.columns])
+    d = np.array([np.subtract(column.theta, least.theta) for column in joint.printed])
     mse = least.mse + np.einsum("ij,jk,ik->i", d, F.T @ F / len(F), d)
     return {"guess": guess, "MSE of guess, wlse, lse, pso": mse}
 

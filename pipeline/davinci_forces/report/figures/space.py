@@ -1,6 +1,5 @@
-"""Draw lines and points in space: a cube with equal axes, seen along parallel rays."""
+"""Draw lines and points in space: a cube with equal axes, seen along parallel rays from in front, right and above."""
 
-from itertools import product
 from math import cos, hypot, radians, sin
 from typing import NamedTuple
 
@@ -19,27 +18,35 @@ CURVE_WIDTH, PLACE_SIZE = 1.4, 4.0  # [pt]
 AROUND = 1.1  # size of the cube over the largest range of the marks
 NUMBER_GAP, LABEL_GAP = 11.0, 30.0  # [pt] from an edge of the cube to its numbers and its label
 HEAD, HALF_ANGLE = 4.0, 0.45  # [pt], [rad] length and half the angle of the head of an arrow
+AZIMUTH, ELEVATION = radians(-60.0), radians(20.0)  # of the reader
+SCREEN = np.array(  # (2, 3) directions to the right and up
+    [
+        [-sin(AZIMUTH), cos(AZIMUTH), 0.0],
+        [-cos(AZIMUTH) * sin(ELEVATION), -sin(AZIMUTH) * sin(ELEVATION), cos(ELEVATION)],
+    ]
+)
+# Of the cube, from -1 to 1 along each axis: its sides behind the marks, and the middles of its edges with numbers.
+BEHIND = np.array([-1.0, 1.0, -1.0])
+EDGES = np.array([[0.0, -1.0, -1.0], [1.0, 0.0, -1.0], [-1.0, -1.0, 0.0]])
+LABELS = ("x [m]", "y [m]", "z [m]")
 
 
 class View(NamedTuple):
-    """A cube on the page: its middle (3,) and half its edge in space, its middle [pt] on the page, and the scale."""
+    """A cube on the page: its middle (3,) and half its edge in space, and both on the page [pt]."""
 
     middle: Array
     half: float
-    screen: Array  # (2, 3) directions to the right and up
-    camera: Array  # (3,) direction to the reader
     centre: tuple[float, float]
-    scale: float  # [pt] for a unit of length
+    scale: float
 
     def place(self, points: Array) -> tuple[Array, Array]:
-        """Points (..., 3) on the page [pt]."""
-        right, up = np.moveaxis((points - self.middle) @ self.screen.T, -1, 0) * self.scale
-        return self.centre[0] + right, self.centre[1] - up
+        """Points (..., 3) in space, as places on the page [pt]."""
+        return self.place_in_cube((points - self.middle) / self.half)
 
-    def side(self, axis: int, front: bool) -> float:
-        """The coordinate of the side of the cube that faces the reader, or of the opposite side."""
-        towards = 1.0 if self.camera[axis] >= 0 else -1.0
-        return float(self.middle[axis] + (towards if front else -towards) * self.half)
+    def place_in_cube(self, points: Array) -> tuple[Array, Array]:
+        """Points (..., 3) of the cube, from -1 to 1 along each axis, as places on the page [pt]."""
+        right, up = np.moveaxis(points @ SCREEN.T, -1, 0) * self.scale
+        return self.centre[0] + right, self.centre[1] - up
 
 
 def view_of(figure: Figure3D, width: float, height: float, top: float) -> View:
@@ -47,83 +54,50 @@ def view_of(figure: Figure3D, width: float, height: float, top: float) -> View:
     points = np.hstack([[mark.x, mark.y, mark.z] for mark in figure.marks])
     least, greatest = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
     half = AROUND / 2 * max(float(np.max(greatest - least)), 1e-9)
-    azimuth, elevation = radians(figure.azimuth), radians(figure.elevation)
-    screen = np.array(
-        [
-            [-sin(azimuth), cos(azimuth), 0.0],
-            [-cos(azimuth) * sin(elevation), -sin(azimuth) * sin(elevation), cos(elevation)],
-        ]
-    )
-    camera = np.array([cos(azimuth) * cos(elevation), sin(azimuth) * cos(elevation), sin(elevation)])
-    corners = np.array(list(product((-half, half), repeat=3))) @ screen.T
-    reach = corners.max(axis=0)
-    below = LABEL_GAP + NORMAL_SIZE  # the labels of the lower edges
-    scale = min((width / 2 - 2 * LABEL_GAP) / reach[0], (height - below) / 2 / reach[1])
-    return View((least + greatest) / 2, half, screen, camera, (width / 2, top + (height - below) / 2), float(scale))
+    right, up = np.abs(SCREEN).sum(axis=1)  # of the farthest corners
+    high = height - LABEL_GAP - NORMAL_SIZE  # without the labels of the lower edges
+    scale = min((width / 2 - 2 * LABEL_GAP) / right, high / 2 / up)
+    return View((least + greatest) / 2, half, (width / 2, top + high / 2), float(scale))
 
 
 def draw_space(figure: Figure3D, marks: tuple[Line3D | Points3D, ...], width: float, top: float) -> str:
     """Cube and marks of a figure that is `width` wide, below `top` [mm]."""
     view = view_of(figure, width * POINT, (figure.height - top) * POINT, top * POINT)
-    labels = (figure.x_label, figure.y_label, figure.z_label)
-    return "".join(draw_axis(view, i, label) for i, label in enumerate(labels)) + "".join(
+    return "".join(draw_axis(view, axis) for axis in range(3)) + "".join(
         draw_line(mark, view) if isinstance(mark, Line3D) else draw_points(mark, view) for mark in marks
     )
 
 
-def draw_axis(view: View, axis: int, label: str) -> str:
+def draw_axis(view: View, axis: int) -> str:
     """Grid lines on the two sides behind the marks that an axis runs along, and its numbers and label at an edge."""
-    low = float(view.middle[axis] - view.half)
+    low, along, edge = float(view.middle[axis] - view.half), np.eye(3)[axis], EDGES[axis]
     values, step = round_values(low, low + 2 * view.half, MAX_STEPS)
+    shares = ((values - view.middle[axis]) / view.half)[:, None] * along
     others = [i for i in range(3) if i != axis]
     grid = "".join(
-        _segment(view, {axis: value, fixed: view.side(fixed, front=False)}, free)
-        for value in values.tolist()
+        _segment(view, share + BEHIND * np.eye(3)[fixed], free)
+        for share in shares
         for fixed, free in (others, others[::-1])
     )
-    edge = _edge(view, axis)
     svg = path(grid, stroke(GRID, 0.5)) + path(_segment(view, edge, axis), stroke(AXES, 0.6))
-    outwards = _outwards(view, edge, axis)
-    for value, number in zip(values.tolist(), in_digits(values, step), strict=True):
-        svg += _words(view, {**edge, axis: value}, outwards, NUMBER_GAP, number, SMALL_SIZE)
-    return svg + _words(view, {**edge, axis: float(view.middle[axis])}, outwards, LABEL_GAP, label, NORMAL_SIZE)
+    # On the page, from the middle of the cube to the edge and across it.
+    outwards, direction = SCREEN @ edge, SCREEN @ along
+    outwards -= direction * (outwards @ direction) / (direction @ direction)
+    outwards /= np.linalg.norm(outwards)
+    for share, number in zip(shares, in_digits(values, step), strict=True):
+        svg += _words(view, edge + share, NUMBER_GAP * outwards, number, SMALL_SIZE)
+    return svg + _words(view, edge, LABEL_GAP * outwards, LABELS[axis], NORMAL_SIZE)
 
 
-def _edge(view: View, axis: int) -> dict[int, float]:
-    """The edge of the cube at which the numbers of an axis stand: at the bottom in front, or the leftmost one."""
-    if axis < 2:
-        return {1 - axis: view.side(1 - axis, front=True), 2: float(view.middle[2] - view.half)}
-    corners = [{0: view.side(0, front), 1: view.side(1, not front)} for front in (True, False)]
-    return min(corners, key=lambda corner: float(view.place(_point(view, corner))[0]))
+def _segment(view: View, point: Array, axis: int) -> str:
+    """The path through a point of the cube along one axis, from side to side."""
+    along = np.eye(3)[axis]
+    return trace(*view.place_in_cube(point + np.array([-along, along])))
 
 
-def _point(view: View, coordinates: dict[int, float]) -> Array:
-    """A point with these coordinates, and those of the cube's middle."""
-    return np.array([coordinates.get(i, float(view.middle[i])) for i in range(3)])
-
-
-def _segment(view: View, coordinates: dict[int, float], free: int) -> str:
-    """The path along one coordinate through the cube."""
-    ends = [_point(view, {**coordinates, free: float(view.middle[free]) + side * view.half}) for side in (-1, 1)]
-    return trace(*view.place(np.array(ends)))
-
-
-def _outwards(view: View, edge: dict[int, float], axis: int) -> tuple[float, float]:
-    """The direction on the page from the middle of the cube to an edge, across the edge."""
-    x, y = (float(side) for side in view.place(_point(view, edge)))
-    along = view.screen[:, axis]
-    across = np.array([x - view.centre[0], view.centre[1] - y])
-    if hypot(*along) > 0:
-        across -= along * (across @ along) / (along @ along)
-    length = hypot(*across) or 1.0
-    return float(across[0] / length), float(-across[1] / length)
-
-
-def _words(
-    view: View, coordinates: dict[int, float], outwards: tuple[float, float], gap: float, text: str, size: float
-) -> str:
-    x, y = (float(side) for side in view.place(_point(view, coordinates)))
-    return words(x + gap * outwards[0], y + gap * outwards[1] + 0.35 * size, text, WORDS, size, "middle")
+def _words(view: View, point: Array, shift: Array, text: str, size: float) -> str:
+    x, y = (float(side) for side in view.place_in_cube(point))
+    return words(x + shift[0], y - shift[1] + 0.35 * size, text, WORDS, size, "middle")
 
 
 def draw_line(mark: Line3D, view: View) -> str:
@@ -140,9 +114,9 @@ def _head(x: Array, y: Array) -> str:
     dx, dy = float(x[0] - x[1]), float(y[0] - y[1])
     if hypot(dx, dy) < HEAD:
         return ""
-    sides = [(cos(a) * dx - sin(a) * dy, sin(a) * dx + cos(a) * dy) for a in (HALF_ANGLE, -HALF_ANGLE)]
-    (a, b), (c, d) = ((HEAD / hypot(dx, dy) * u, HEAD / hypot(dx, dy) * v) for u, v in sides)
-    return trace(np.array([x[1] + a, x[1], x[1] + c]), np.array([y[1] + b, y[1], y[1] + d]))
+    back = HEAD * complex(dx, dy) / hypot(dx, dy)
+    a, b = (back * complex(cos(angle), sin(angle)) for angle in (HALF_ANGLE, -HALF_ANGLE))
+    return trace(x[1] + np.array([a.real, 0.0, b.real]), y[1] + np.array([a.imag, 0.0, b.imag]))
 
 
 def draw_points(mark: Points3D, view: View) -> str:

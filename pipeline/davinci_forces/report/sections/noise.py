@@ -40,12 +40,16 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
             *run_cells(a),
             context.number(f"period.{a.log}", 6),
             context.count(f"period.{a.log}.periods"),
-            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau")),
+            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau", "relative_noise")),
         )
         for a in averages
     )
-    header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise")
-    yield Table("Noise between periods (standard deviations of one sample).", header, rows, "noise-table", "llrrrrr")
+    header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise", "Share")
+    caption = (
+        "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
+        "repeat, over the RMS effort. It is part of every relative error, as no model can remove it."
+    )
+    yield Table(caption, header, rows, "noise-table", "llrrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)

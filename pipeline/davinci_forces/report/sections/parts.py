@@ -39,11 +39,6 @@ LEFT_OUT = {
     "leave a block of path out": "a block of path",
     "leave a segment out": "a segment",
 }
-MEASURES = (
-    "With periods left out, the error measures how well a model describes the path that it was fitted to: all periods "
-    "follow this path, so extra parameters lower this error even if they overfit. With blocks of path left out, on raw "
-    "samples, the error measures what to expect on a new path. This error is larger, and the model is chosen by it."
-)
 
 
 def section_of(

@@ -54,7 +54,6 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
     yield from first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
-    yield OnScreen("Noise that the filter assumes, run by run", "filter-assumptions", (assumptions(context, tracks),))
     others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
     if others:
         folded = tuple(
@@ -100,20 +99,6 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
     words = band_in_words(spaces[0].coverage) if spaces else "–"
     by_speed = ", ".join(map(percent, spaces[0].quartile_coverage)) if spaces else ""
     return context.number(f"effort.{t.log}.{t.joint}.coverage", 2), by_speed or "–", words
-
-
-def assumptions(context: Context, tracks: list[Track]) -> Table:
-    """The noise that the filter assumes in each run."""
-    names = ("r_q", "r_dq", "q_dq", "q_tau")
-    rows = tuple((*run_cells(t), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
-    caption = (
-        "Noise that the filter assumes (standard deviations): of the measured position and velocity, of the velocity "
-        "per sample due to effort noise, and of the random walk of the external effort. The first three maximise the "
-        "likelihood of the innovations of identification logs. The random walk is the smallest with which the filter "
-        "follows a push."
-    )
-    header = ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk")
-    return Table(caption, header, rows, "filter-noise", "llrrrr")
 
 
 def trace(context: Context, t: Track, why: str) -> Figure:

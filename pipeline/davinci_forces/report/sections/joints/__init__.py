@@ -26,7 +26,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
+from davinci_forces.report.sections.joints.estimators import convergence, estimators
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name, section_of
@@ -75,7 +75,6 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
     yield from unidentified_parameters(context, joint, used is plain)
     yield from implausible([used] if used is not plain else fits, joint)
-    yield from left_out(context, joint)
     yield comparison(context, fits)
 
 
@@ -223,7 +222,6 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
     more = (
         *estimators(context, first),
-        *printed_beside(context, first),
         *convergence(context, group),
         *correlations(context, group),
         *friction_maps(context, group),

@@ -1,18 +1,13 @@
-"""The estimators of a joint compared with each other, with published values, and on data left out."""
+"""The estimators of a joint compared with each other."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Average, Fit, Prediction, Residual, SwarmSearch
-from davinci_forces.records.prediction import CHOSEN, CHOSEN_BY_LOG
-from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Bullets, Cell, Figure, Line, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.records import Fit, Residual, SwarmSearch
+from davinci_forces.report.content import Figure, Line, Panel, literal
 from davinci_forces.report.content.marks import Colour
-from davinci_forces.report.context import Context, estimator_name, fit_name, label, title
-from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.parts import LEFT_OUT, MEASURES
-from davinci_forces.robots.robot import Printed
+from davinci_forces.report.context import Context, estimator_name, label, title
 
 LOOKS: dict[str, Colour] = {
     "lse": "vermillion",
@@ -87,85 +82,3 @@ def excess_in_words(excess: float) -> str:
     if excess < REACHED:
         return "is reached"
     return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
-
-
-DIGITS = 3  # digits of a number without standard error
-
-
-def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
-    """The thesis's table of a joint, next to this study's values; none in a user's study."""
-    joint = context.study.robot.joint(fit.group)
-    printed = joint.printed
-    if not context.compares_with_thesis or printed is None or joint.effort:
-        return
-    if any(len(column.theta) != len(fit.parameter) for column in printed.columns):
-        return
-    yield Prose(
-        f"{printed.name} of the thesis, next to this study's values: first guesses, recomputed from the robot's masses "
-        "and lengths, and every estimator on this study's periods. The study is simulated, so its values are those of "
-        "the simulation, not of the arm."
-    )
-    yield table(context, fit, printed)
-    yield Bullets(tuple(f"Misprint: {text[:1].lower()}{text[1:]}" for text in printed.misprints))
-
-
-def table(context: Context, fit: Fit, printed: Printed) -> Table:
-    """Parameters and mean squared error, printed and of this study."""
-    header = ["Parameter", "Unit"]
-    for column in printed.columns:
-        header += [f"{estimator_name(column.estimator) or 'Guess'}, printed", "here"]
-    rows: list[tuple[Cell, ...]] = []
-    names, units = (*map(str, fit.parameter), "mse"), (*(format_unit(unit) or "–" for unit in fit.unit), "–")
-    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
-        pairs: list[Cell] = []
-        for column in printed.columns:
-            prefix = f"fit.{fit.group}.{fit.model}.{column.estimator}" if column.estimator else f"guess.{fit.group}"
-            value = f"{(*column.theta, column.mse)[i]:g}".replace("-", "−")
-            pairs += [value, context.number(f"{prefix}.{slug(name)}", DIGITS, unit="", std=None)]
-        rows.append(("mean squared error" if name == "mse" else name, unit, *pairs))
-    caption = f"{title(fit.group)}: {printed.name} as printed, and this study's values."
-    return Table(caption, tuple(header), tuple(rows), f"printed-{fit.group}", "ll" + "r" * (len(header) - 2))
-
-
-def left_out(context: Context, joint: str) -> Iterator[Block]:
-    """Every fit of a joint by its error on logs or periods left out; the chosen one also by blocks of path left out."""
-    by_fit: dict[tuple[str, str], list[Prediction]] = {}
-    for p in context.catalogue.select(Prediction, joint=joint, role="identification"):
-        if p.model not in (CHOSEN, CHOSEN_BY_LOG):
-            by_fit.setdefault((p.model, p.estimator), []).append(p)
-    if not by_fit:
-        return
-    rows = tuple(left_out_row(context, joint, of_fit) for of_fit in by_fit.values())
-    header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
-    caption = f"{title(joint)}: relative error of the errors of its fits on data that were left out, in the worst log."
-    table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
-    says = Prose(f"{MEASURES}{noise_share(context, joint)}")
-    yield OnScreen(
-        f"{title(joint)}: the errors of its fits on data that were left out", f"all-left-out-{joint}", (says, table)
-    )
-
-
-def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
-    """One fit by its worst log; the chosen fit also by blocks of path."""
-    worst = max(of_fit, key=lambda p: p.relative_error)
-    chosen = context.catalogue.select(Prediction, joint=joint, role="identification", model=CHOSEN)
-    by_blocks = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
-    blocks: Cell = "–"
-    if by_blocks:
-        blocks = context.number(f"{max(by_blocks, key=lambda p: p.relative_error).prefix}.relative_error", 3)
-    name = fit_name(worst.model, worst.estimator)
-    which = LEFT_OUT.get(worst.scheme, worst.scheme.removeprefix("leave ").removesuffix(" out"))
-    return f"**{name}**" if by_blocks else name, which, context.number(f"{worst.prefix}.relative_error", 3), blocks
-
-
-def noise_share(context: Context, joint: str) -> str:
-    """State the noise in either error, if the periods determine it."""
-    logs = [average.log for average in context.catalogue.select(Average, joint=joint)]
-    if not logs:
-        return ""
-    worst = max(logs, key=lambda log: context.results[f"noise.{log}.{joint}.relative_noise"].value)
-    least = context.number(f"noise.{worst}.{joint}.relative_noise", 2)
-    return (
-        f" Noise alone makes {least} of either error. It neither repeats nor is as slow as motion, so no model can "
-        "remove it."
-    )
