@@ -1,7 +1,5 @@
 """What sections compute and decide, on small records whose answer is known."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,19 +11,21 @@ from davinci_forces.report.sections.joints.friction import in_words as friction_
 from davinci_forces.report.sections.joints.residuals import in_words, motion_panel
 from davinci_forces.report.sections.noise import histogram
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot
-from davinci_forces.report.sections.robot import walk
+from davinci_forces.report.sections.robot import links_in_space
 from davinci_forces.report.sections.tissue import spread, spread_panel, surface_map
 from tests.report.report_records import record
 
 
-def test_a_line_along_the_links_goes_back_along_a_branch_and_over_no_gap():
-    """Two jaws on one head: the line visits every frame, and each step of it is a link."""
+def test_every_link_is_drawn_from_the_frame_that_carries_it_and_over_no_gap():
+    """Two jaws on one head."""
     parent = {"0": "", "1": "0", "2": "1", "left": "2", "tip": "left", "right": "2"}
-    pose = record(Pose, 6, link=np.array([*parent], object), parent=np.array([*parent.values()], object))
-    path = [str(pose.link[i]) for i in walk(pose)]
-    assert set(path) == set(parent)
-    assert all(b in (parent[a], *(c for c in parent if parent[c] == a)) for a, b in pairwise(path))
-    assert path == ["0", "1", "2", "left", "tip", "left", "2", "right"]
+    names, x = [*parent], np.arange(6.0)
+    pose = record(Pose, 6, link=np.array(names, object), parent=np.array([*parent.values()], object), x=x)
+    start, end, gap = links_in_space(pose).reshape(-1, 3, 3).transpose(1, 0, 2)
+    assert {(names[int(a)], names[int(b)]) for a, b in zip(start[:, 0], end[:, 0], strict=True)} == {
+        (carrier, name) for name, carrier in parent.items() if carrier
+    }
+    assert np.isnan(gap).all()
 
 
 def residual(errors, dq) -> Residual:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from ctypes import CDLL
-from dataclasses import Field, fields
+from dataclasses import fields
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -63,7 +63,9 @@ class Writer:
             target.parent.mkdir(parents=True, exist_ok=True)
             described = schema(type(record), self.unit(record))
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
-        self._open[place].write_table(_table(record, self._open[place].schema), BLOCK_SAMPLES)
+        described = self._open[place].schema
+        columns = {f.name: _column(getattr(record, f.name), f.type) for f in described}
+        self._open[place].write_table(pa.table(columns, described), BLOCK_SAMPLES)
         self._described[place] = self._metadata(record)
         return place
 
@@ -100,19 +102,16 @@ class Writer:
 
 def schema(kind: type[Record], unit: Unit) -> pa.Schema:
     """Return the columns of a record, each with its meaning and unit."""
-    return _schema(kind, tuple(unit(QUANTITIES[f.name].unit) for f in _stored(kind)))  # type: ignore[arg-type]  # a class is hashable
+    return _schema(kind, tuple(unit(QUANTITIES[name].unit) for name in kind.columns()))  # type: ignore[arg-type]  # a class is hashable
 
 
 @cache
 def _schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
+    types: dict[str, Any] = {f.name: f.type for f in fields(kind)}  # type: ignore[arg-type]
     return pa.schema(
-        pa.field(f.name, ARROW[f.type], nullable=False, metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit})
-        for f, unit in zip(_stored(kind), units, strict=True)
+        pa.field(name, ARROW[types[name]], nullable=False, metadata={"meaning": QUANTITIES[name].meaning, "unit": unit})
+        for name, unit in zip(kind.columns(), units, strict=True)
     )
-
-
-def _stored(kind: Any) -> list[Field[Any]]:
-    return [f for f in fields(kind) if f.type in ARROW]
 
 
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", longest: int | None = None) -> AnyRecord:
@@ -208,10 +207,6 @@ def _encoding(described: pa.Schema) -> dict[str, Any]:
         "write_statistics": False,
         "store_schema": True,
     }
-
-
-def _table(record: Record, described: pa.Schema) -> pa.Table:
-    return pa.table({f.name: _column(getattr(record, f.name), f.type) for f in described}, described)
 
 
 def _column(values: np.ndarray[Any, Any], kind: pa.DataType) -> pa.Array:

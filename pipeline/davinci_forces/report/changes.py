@@ -71,17 +71,12 @@ class Change:
     @property
     def weight(self) -> tuple[int, bool, float]:
         """A weight to sort by: the rank, then standard errors, then relative differences, then other changes."""
-        return -RANKS[self.subject], *self.size
-
-    @property
-    def size(self) -> tuple[bool, float]:
-        """A size to sort by: standard errors first, then relative differences, then other changes."""
-        a, b = (number.number if number else None for number in (self.before, self.after))
+        rank, a, b = -RANKS[self.subject], *(x.number if x else None for x in (self.before, self.after))
         if self.z is not None:
-            return True, abs(self.z)
+            return rank, True, abs(self.z)
         if a is None or b is None or not math.isfinite(b - a):
-            return False, math.inf
-        return False, abs(b - a) / max(abs(a), abs(b), math.ulp(0.0))
+            return rank, False, math.inf
+        return rank, False, abs(b - a) / max(abs(a), abs(b), math.ulp(0.0))
 
 
 def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue]) -> list[Change]:

@@ -93,11 +93,7 @@ class Context:
         """`<model>.<estimator>` of the fit of a joint by itself: the fit that the filter used, or least squares."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
         chosen = [p.estimator for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
-        wanted = (
-            (*chosen[:1], BASELINE_FIT)
-            if self.study.settings.fit == CHOSEN
-            else (self.study.settings.fit, BASELINE_FIT)
-        )
+        wanted = chosen[:1] if self.study.settings.fit == CHOSEN else [self.study.settings.fit]
         return next((name for name in (*wanted, BASELINE_FIT, *names) if name in names), self.study.settings.fit)
 
     def worst_space(self, joint: str) -> FreeSpace | None:

@@ -20,9 +20,7 @@ from davinci_forces.study.review import Rating
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
 Part = TypeVar("Part", bound=Any)
-MAX_POINTS_OF_MARK = (
-    1 << 16
-)  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
+MAX_POINTS_OF_MARK = 1 << 16  # several times what a page shows, so that thinning again hides nothing
 
 
 @dataclass(frozen=True)
@@ -123,17 +121,12 @@ def _shown(part: Part) -> Part:
 
 @dataclass(frozen=True, eq=False)
 class Figure3D:
-    """Lines and points in space on equal axes, seen from `elevation` and `azimuth` [deg]; `height` in [mm]."""
+    """Lines and points in space [m] on equal axes; `height` in [mm]."""
 
     caption: str
     alt: str
     marks: tuple[Line3D | Points3D, ...]
     label: str | None = None
-    x_label: str = "x [m]"
-    y_label: str = "y [m]"
-    z_label: str = "z [m]"
-    elevation: float = 20.0
-    azimuth: float = -60.0
     height: float = 100.0
 
     def __post_init__(self) -> None:

@@ -60,9 +60,11 @@ def number_blocks(document: Document) -> tuple[Placed, ...]:
     Raises
     ------
     ValueError
-        If a reference leads nowhere.
+        If references lead nowhere, with all of their labels.
     """
-    check_references(document)
+    named = {name_of(block) for block in walk(document)}
+    if missing := sorted(set(marked_texts(document, "reference")) - named):
+        raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
     counters: Counter[str] = Counter()
     return tuple(_section(section, str(i), 1, counters) for i, section in enumerate(document.sections, 1))
 
@@ -96,19 +98,6 @@ def marked_texts(document: Document, kind: Kind) -> Iterator[str]:
     for block in walk(document):
         for text in TEXTS[type(block)](block):
             yield from (span.text for span in parse(text) if span.kind == kind)
-
-
-def check_references(document: Document) -> None:
-    """Check that every reference leads somewhere.
-
-    Raises
-    ------
-    ValueError
-        If any does not, with all of their labels.
-    """
-    named = {name_of(block) for block in walk(document)}
-    if missing := sorted(set(marked_texts(document, "reference")) - named):
-        raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
 
 
 def _section(section: Section, number: str, depth: int, counters: Counter[str]) -> Placed:

@@ -11,11 +11,8 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import Figure
 from davinci_forces.report.content.marks import (
     AnyMark,
-    Band,
     Bars,
-    HBand,
     Histogram,
-    HLine,
     Line,
     Line3D,
     Panel,
@@ -23,8 +20,6 @@ from davinci_forces.report.content.marks import (
     Points3D,
     Stems,
     Tiles,
-    VLine,
-    VSpan,
 )
 from davinci_forces.report.content.thinning import is_sorted, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
@@ -189,29 +184,15 @@ def _up(panel: Panel, height: float) -> Axis:
 
 def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
     """The values of x and of y that axes show of a mark."""
-    match mark:
-        case Points():
-            std = 0.0 if mark.y_std is None else mark.y_std
-            return [mark.x], [mark.y - std, mark.y + std]
-        case Band():
-            return [mark.x], [mark.lower, mark.upper]
-        case Stems():
-            return [mark.x], [mark.y, np.zeros(1)]
-        case Histogram():
-            return [mark.edges], [mark.counts, np.zeros(1)]
-        case Bars():
-            return [np.array([-0.5, len(mark.names) - 0.5])], [mark.heights, np.zeros(1)]
-        case Line():
-            return [mark.x], [mark.y]
-        case HLine():
-            return [], [np.array([mark.y])]
-        case VLine():
-            return [np.array([mark.x])], []
-        case HBand():
-            return [], [np.array([mark.lower, mark.upper])]
-        case VSpan():
-            return [np.array([mark.start, mark.end])], []
-    return [], []
+    x, y = (
+        [np.atleast_1d(getattr(mark, name)) for name in names if hasattr(mark, name)]
+        for names in (("x", "edges", "start", "end"), ("y", "lower", "upper", "heights", "counts"))
+    )
+    if isinstance(mark, Points) and mark.y_std is not None:
+        y = [mark.y - mark.y_std, mark.y + mark.y_std]
+    if isinstance(mark, Stems | Histogram | Bars):
+        y.append(np.zeros(1))
+    return [np.array([-0.5, len(mark.names) - 0.5])] if isinstance(mark, Bars) else x, y
 
 
 def _fitted(panel: PlacedPanel, width: float, wide: float) -> PlacedPanel:

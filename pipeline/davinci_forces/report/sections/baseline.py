@@ -1,5 +1,6 @@
 """Changes since the baseline: an earlier report that the study names, of itself or of another study."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from davinci_forces.report.changes import Change, StatedValue, changes
@@ -23,7 +24,8 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context, before: Mapping[str, StatedValue], differences: Sequence[Change]) -> Iterator[Block]:
     """The section's content."""
-    changed = sorted((c for c in differences if c.before and c.after), key=weight, reverse=True)
+    changed = [c for c in differences if c.before and c.after]
+    changed.sort(key=lambda c: -abs(c.z) if c.z is not None else -math.inf)  # those without standard error first
     came, went = [c.key for c in differences if not c.before], [c.key for c in differences if not c.after]
     shared = sum(key in context.results for key in before)
     yield Prose(
@@ -40,11 +42,6 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
             more = [f"and {len(keys) - MAX_ROWS} more"] if len(keys) > MAX_ROWS else []
             listed = Listing("\n".join([*keys[:MAX_ROWS], *more]))
             yield OnScreen(f"{count(len(keys), what + ' key')}", anchor, (listed,))
-
-
-def weight(change: Change) -> float:
-    """A change in standard errors; changes without standard error come first."""
-    return abs(change.z) if change.z is not None else float("inf")
 
 
 def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:

@@ -57,7 +57,7 @@ def viscous_friction(context: Context, study: ControlStudy) -> str:
 def response(context: Context, study: ControlStudy) -> Figure:
     """Positions, velocities and the Lyapunov function of a study."""
     until = SHARE_DRAWN * study.duration
-    runs = runs_of(context, study)
+    runs = context.catalogue.select(Control, controller=study.name)
     names = [joint.name for joint in context.study.robot.joints]
     q = tuple(Line(run.t[run.t < until], run.q[run.t < until], title(run.joint)) for run in runs)
     identified = [run for run in runs if run.joint in names]
@@ -84,11 +84,6 @@ def table(context: Context, studies: list[ControlStudy], caption: str, columns: 
     rows = tuple(
         (study.name, title(run.joint), *context.numbers(f"control.{run.controller}.{run.joint}", columns.values()))
         for study in studies
-        for run in runs_of(context, study)
+        for run in context.catalogue.select(Control, controller=study.name)
     )
     return Table(caption, ("Study", "Joint", *columns), rows, align="llrrr")
-
-
-def runs_of(context: Context, study: ControlStudy) -> list[Control]:
-    """The joints of a study."""
-    return context.catalogue.select(Control, controller=study.name)

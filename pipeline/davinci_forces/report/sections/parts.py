@@ -144,6 +144,11 @@ def normal_plot(title: str, x: Column, axis: str) -> Panel:
     return Panel(title, "normal quantile", axis, (Points(scores[shown], ordered[shown], "", "blue"), line))
 
 
+def strokes(start: Column, end: Column) -> Column:
+    """A line from each start (N, 3) to its end, as one interrupted line (3 N, 3)."""
+    return np.stack([start, end, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
+
+
 def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Prediction]:
     """The predictions of free motion in logs that no fit uses; all of them if there is none."""
     return [

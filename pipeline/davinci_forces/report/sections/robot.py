@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Links, Pose, Workspace
+from davinci_forces.records import Column, Links, Pose, Workspace
 from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
 from davinci_forces.report.content.marks import Colour
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import section_of
+from davinci_forces.report.sections.parts import section_of, strokes
 
 
 @section_of("The robot", "robot", Links)
@@ -39,18 +39,11 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
     yield chain(context)
 
 
-def walk(pose: Pose) -> list[int]:
-    """The frames in the order of one line along every link, which goes to and fro at branches."""
+def links_in_space(pose: Pose) -> Column:
+    """A line from each frame to the one that carries it, as one interrupted line (3 N, 3)."""
     number = {name: i for i, name in enumerate(pose.link)}
-    path = [0]
-    for i in range(1, len(pose.link)):
-        up, down = ([start] for start in (path[-1], i))
-        for way in (up, down):
-            while way[-1] != 0:
-                way.append(number[pose.parent[way[-1]]])
-        meet = next(frame for frame in up if frame in down)
-        path += up[1 : up.index(meet) + 1] + down[: down.index(meet)][::-1]
-    return path
+    frames = np.column_stack([pose.x, pose.y, pose.z])
+    return strokes(frames[[number[name] for name in pose.parent[1:]]], frames[1:])
 
 
 def chain(context: Context) -> Figure3D:
@@ -62,8 +55,8 @@ def chain(context: Context) -> Figure3D:
     for workspace in context.catalogue.records(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
     for pose in context.catalogue.records(Pose):
-        path, (name, colour) = walk(pose), configurations[pose.pose]
-        marks.append(Line3D(pose.x[path], pose.y[path], pose.z[path], name, colour))
+        x, y, z = links_in_space(pose).T
+        marks.append(Line3D(x, y, z, *configurations[pose.pose]))
     return Figure3D(
         "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
         "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",

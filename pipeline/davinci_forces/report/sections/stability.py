@@ -5,6 +5,7 @@ from itertools import cycle
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stiffness
 from davinci_forces.report.content import (
     Band,
@@ -22,7 +23,6 @@ from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, label
 from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name, section_of
 
-NORMAL_95 = 1.96  # quantile of a 95 % interval
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
 SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
 ROWS = (

@@ -31,7 +31,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import section_of
+from davinci_forces.report.sections.parts import section_of, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 F = ("f_x", "f_y", "f_z")
@@ -230,11 +230,6 @@ def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Colum
     at = np.unique(np.clip(np.searchsorted(force.t, np.concatenate(times)), 0, len(f) - 1))
     at = at[np.isfinite(f[at, 0])]
     return at, f[at]
-
-
-def strokes(start: Column, end: Column) -> Column:
-    """A line from each start (N, 3) to its end, as one interrupted line (3 N, 3)."""
-    return np.stack([start, end, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
 
 
 def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line3D:

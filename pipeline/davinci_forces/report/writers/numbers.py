@@ -13,6 +13,7 @@ from davinci_forces.report.content import Figure, Figure3D, Panel
 from davinci_forces.report.content.inline import printable
 from davinci_forces.report.content.thinning import is_sorted, points_of, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
+from davinci_forces.report.figures.space import LABELS
 
 Json = dict[str, Any]
 PIXELS = 96 / 25.4  # of CSS in a millimetre
@@ -27,7 +28,7 @@ def numbers_json(figure: Figure | Figure3D) -> str:
     if isinstance(figure, Figure):
         panels = figure.panels
     else:  # marks in space, in the form of a panel's marks
-        panels = (Panel("", figure.x_label, f"{figure.y_label}, {figure.z_label}", figure.marks),)  # type: ignore[arg-type]
+        panels = (Panel("", LABELS[0], ", ".join(LABELS[1:]), figure.marks),)  # type: ignore[arg-type]
     content = {
         "across": figure.columns if isinstance(figure, Figure) else 1,
         "height": round(figure.height * PIXELS),

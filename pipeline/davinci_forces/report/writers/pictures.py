@@ -4,9 +4,9 @@ import re
 from collections.abc import Collection
 from urllib.parse import quote
 
-from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS
+from davinci_forces.report.figures.palette import COLOURS, PALETTE
 
-NAMES = {light: name for name, light in COLOURS.items()} | {light: name for name, (light, _) in SURROUNDINGS.items()}
+NAMES = {light: name for name, light in COLOURS.items()}
 FONT = "system-ui,-apple-system,'Segoe UI',Roboto,Arial,'DejaVu Sans',sans-serif"
 # Characters that a data URL must escape as %XX.
 ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
@@ -14,9 +14,8 @@ ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
 
 def looks(used: Collection[str]) -> tuple[str, ...]:
     """The used colours of marks and their surroundings as CSS variables, on a light page and on a dark page."""
-    light = COLOURS | {name: pair[0] for name, pair in SURROUNDINGS.items()}
-    dark = DARK | {name: pair[1] for name, pair in SURROUNDINGS.items()}
-    return tuple(";".join(f"--{name}:{side[name]}" for name in side if name in used) for side in (light, dark))
+    shown = [(name, pair) for name, pair in PALETTE.items() if name in used]
+    return tuple(";".join(f"--{name}:{pair[page]}" for name, pair in shown) for page in (0, 1))
 
 
 def address(svg: str) -> str:
