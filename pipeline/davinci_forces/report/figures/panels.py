@@ -45,14 +45,13 @@ NARROW, X_STEPS, FEW_X_STEPS, Y_STEPS = 70.0, 8, 4, 5  # [mm] a narrow panel; la
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a panel: its title in lines, and the labels and entries of its legend, so many side by side.
+    """What stands above a panel: its title in lines, and the entries of its legend, so many side by side.
 
     A legend of one row stands `beside` the title if both fit.  One that holds for all panels of a row goes `across`
     them, above their titles.
     """
 
     title: str
-    labels: tuple[str, ...]
     entries: tuple[str, ...]
     columns: int
     beside: bool
@@ -71,15 +70,14 @@ class Heading:
 class PlacedPanel:
     """A panel with its marks as they are drawn, its axes, and their place on the page [mm], from the top left."""
 
-    title: str
     marks: tuple[AnyMark, ...]
     x: Axis
     y: Axis
     heading: Heading
-    y_numbers: float = 0.0  # width of the numbers left of the axes
+    y_numbers: float  # width of the numbers left of the axes
+    width: float
     left: float = 0.0
     top: float = 0.0
-    width: float = 0.0
     height: float = 0.0
 
     @property
@@ -97,7 +95,7 @@ def plan_heading(title: str, marks: Sequence[AnyMark | Line3D | Points3D], room:
     title = _wrap(title, 0.9 * room)  # bold letters are wider
     row = sum(SAMPLE + LETTER_WIDTH * len(label) for label in labels) + 3
     beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER_WIDTH * len(title) + row <= room
-    return Heading(title, labels, entries, columns, beside)
+    return Heading(title, entries, columns, beside)
 
 
 def lines_of(text: str) -> int:
@@ -111,11 +109,14 @@ def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
     The height that a figure asks for includes its words, with two lines of heading.
     """
     columns, width = figure.columns, PAGE_WIDTH / figure.columns
-    panels = [_with_axes(figure, place, width) for place in range(len(figure.panels))]
-    numbers = max(panel.y.characters for panel in panels) * DIGIT
-    left = TICK + numbers + max(lines_of(panel.y.label) for panel in panels) * LINE_HEIGHT + 1
+    drawn = [_marks_and_axes(figure, place, width) for place in range(len(figure.panels))]
+    numbers = max(y.characters for _, _, y in drawn) * DIGIT
+    left = TICK + numbers + max(lines_of(y.label) for _, _, y in drawn) * LINE_HEIGHT + 1
     wide = width - left - RIGHT
-    panels = [_fitted(panel, width, wide) for panel in panels]
+    panels = [
+        PlacedPanel(marks, _numbered(x, width, wide), y, plan_heading(panel.title, marks, wide), numbers, wide)
+        for panel, (marks, x, y) in zip(figure.panels, drawn, strict=True)
+    ]
     rows = [_sharing_legend(panels[i : i + columns], left) for i in range(0, len(panels), columns)]
     above = [max(panel.heading.height for panel in row) for row in rows]
     below = [max(panel.room_below for panel in row) for row in rows]
@@ -125,7 +126,7 @@ def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
     for row, over, under in zip(rows, above, below, strict=True):
         top += over
         for j, panel in enumerate(row):
-            placed.append(replace(panel, y_numbers=numbers, left=j * width + left, top=top, width=wide, height=high))
+            placed.append(replace(panel, left=j * width + left, top=top, height=high))
         top += high + under
     return tuple(placed), top
 
@@ -133,14 +134,14 @@ def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
 def _sharing_legend(row: list[PlacedPanel], left: float) -> list[PlacedPanel]:
     """The panels of a row; if the first one alone has a legend, that goes across all."""
     first, *others = row
-    if not others or not first.heading.labels or any(panel.heading.labels for panel in others):
+    if not others or not first.heading.entries or any(panel.heading.entries for panel in others):
         return row
     legend = plan_heading("", first.marks, PAGE_WIDTH - left)
     return [replace(first, heading=replace(legend, title=first.heading.title, across=True)), *others]
 
 
-def _with_axes(figure: Figure, place: int, width: float) -> PlacedPanel:
-    """A panel with the ranges of its axes, and the numbers on the vertical one."""
+def _marks_and_axes(figure: Figure, place: int, width: float) -> tuple[tuple[AnyMark, ...], Axis, Axis]:
+    """The marks of a panel as they are drawn, and its axes; the horizontal one may have no numbers yet."""
     panel = figure.panels[place]
     marks = tuple(thin_mark(mark, max_points(mark, width)) for mark in assign_looks(panel.marks))
     sharing = figure.panels if figure.zoomable else (panel,)
@@ -156,7 +157,7 @@ def _with_axes(figure: Figure, place: int, width: float) -> PlacedPanel:
         x = x.with_names(names)
     elif panel.x_dates:
         x = x.with_dates(FEW_X_STEPS)
-    return PlacedPanel(panel.title, marks, x, y, plan_heading(panel.title, marks, width))
+    return marks, x, y
 
 
 def _across(panels: Sequence[Panel], label: str) -> Axis:
@@ -195,11 +196,10 @@ def _extent(mark: AnyMark) -> tuple[list[Array], list[Array]]:
     return [np.array([-0.5, len(mark.names) - 0.5])] if isinstance(mark, Bars) else x, y
 
 
-def _fitted(panel: PlacedPanel, width: float, wide: float) -> PlacedPanel:
-    """A panel with the numbers and the label of its horizontal axis, and its heading, for axes of this width [mm]."""
-    x = panel.x if panel.x.values else panel.x.with_numbers(FEW_X_STEPS if width < NARROW else X_STEPS, wide / DIGIT)
-    x = replace(x, label=wrap_label(x.label, width - 18))
-    return replace(panel, x=x, heading=plan_heading(panel.title, panel.marks, wide))
+def _numbered(x: Axis, width: float, wide: float) -> Axis:
+    """The horizontal axis of a panel with its numbers and label; axes are `wide` and the panel `width` [mm]."""
+    x = x if x.values else x.with_numbers(FEW_X_STEPS if width < NARROW else X_STEPS, wide / DIGIT)
+    return replace(x, label=wrap_label(x.label, width - 18))
 
 
 def max_points(mark: AnyMark, width: float) -> int:

@@ -10,7 +10,6 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import Figure, Figure3D, Panel
-from davinci_forces.report.content.inline import printable
 from davinci_forces.report.content.thinning import is_sorted, points_of, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
 from davinci_forces.report.figures.space import LABELS
@@ -53,11 +52,9 @@ def _mark(mark: Any, columns: dict[str, int], linear: bool) -> Json:
 
 
 def _plain(value: Any) -> Any:
-    """A value for JSON, without characters that a page cannot show and without NaN or infinity."""
+    """A value for JSON, without NaN or infinity."""
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
-    if isinstance(value, str):
-        return printable(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -114,13 +114,12 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
 
 def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
     """Middles of the equal bins of x with samples, the mean of y in each bin, and its standard error."""
-    edges = np.linspace(x.min(), x.max(), bins + 1)
-    place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
-    held = [y[place == i] for i in range(bins)]
-    full = [i for i, values in enumerate(held) if len(values)]
-    means = np.array([held[i].mean() for i in full])
-    stds = np.array([held[i].std() / np.sqrt(len(held[i])) for i in full])
-    return (edges[:-1] + edges[1:])[full] / 2, means, stds
+    from scipy.stats import binned_statistic
+
+    count, mean, std = (binned_statistic(x, y, statistic, bins) for statistic in ("count", "mean", "std"))
+    full, n = count.statistic > 0, np.maximum(count.statistic, 1)
+    middle = (count.bin_edges[:-1] + count.bin_edges[1:]) / 2
+    return middle[full], mean.statistic[full], (std.statistic / np.sqrt(n))[full]
 
 
 def correlation(x: Column, y: Column, lags: Counts) -> Column:
@@ -135,11 +134,11 @@ def explained_by(x: Column, y: Column, bins: int = 40) -> float:
 
     The correlation ratio with Wherry's correction, 0 if y does not depend on x in any way.
     """
-    place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
-    counts = np.bincount(place, minlength=bins)
-    means = np.bincount(place, y, bins) / np.maximum(counts, 1)
-    unexplained, spread = float(np.sum((y - means[place]) ** 2)), float(y.var() * len(y))
-    ranges = int((counts > 0).sum())
+    from scipy.stats import binned_statistic
+
+    means, _, bin_number = binned_statistic(x, y, "mean", bins)
+    unexplained, spread = float(np.sum((y - means[bin_number - 1]) ** 2)), float(y.var() * len(y))
+    ranges = int(np.isfinite(means).sum())
     if not spread or len(y) <= ranges:
         return 0.0
     return 1.0 - unexplained / spread * (len(y) - 1) / (len(y) - ranges)
