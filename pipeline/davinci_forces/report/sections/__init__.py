@@ -1,6 +1,8 @@
 """The sections of a report, in order: one module per section, exporting `section`, and its name in the list below.
 
-section(context: Context) -> Section | None        None if a study has no such content; they share `parts`
+section(context: Context) -> Section | None        None if a study has no such content
+
+They share `parts`, where `section_of` makes this function of one that yields blocks.
 """
 
 from collections.abc import Callable

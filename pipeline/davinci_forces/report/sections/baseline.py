@@ -4,22 +4,20 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from davinci_forces.report.changes import Change, StatedValue, changes
-from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Section, Table, literal
+from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.parts import paper_or_screen
+from davinci_forces.report.sections.parts import paper_or_screen, section_of
 
 MAX_ROWS = 300  # of a table; `davinci-forces compare` prints all changes
 
 
-def section(context: Context) -> Section | None:
+@section_of("Since the baseline", "baseline")
+def section(context: Context) -> Iterator[Block]:
     """How many numbers changed, the largest changes, and the keys that came or went."""
-    if context.baseline is None:
-        return None
-    now = {key: StatedValue(r.value, r.std, r.unit) for key, r in context.results.items()}
-    return Section(
-        "Since the baseline", "baseline", tuple(blocks(context, context.baseline, changes(context.baseline, now)))
-    )
+    if context.baseline is not None:
+        now = {key: StatedValue(r.value, r.std, r.unit) for key, r in context.results.items()}
+        yield from blocks(context, context.baseline, changes(context.baseline, now))
 
 
 def blocks(context: Context, before: Mapping[str, StatedValue], differences: Sequence[Change]) -> Iterator[Block]:

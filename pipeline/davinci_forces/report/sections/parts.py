@@ -31,14 +31,6 @@ MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
-LEFT_OUT = {
-    "validation": "never fitted",
-    "contact": "never fitted",
-    "leave one log out": "the log",
-    "leave one period out": "a period",
-    "leave a block of path out": "a block of path",
-    "leave a segment out": "a segment",
-}
 
 
 def section_of(

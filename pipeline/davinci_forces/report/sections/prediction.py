@@ -6,7 +6,6 @@ from davinci_forces.records import Prediction
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Table
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections.parts import (
-    LEFT_OUT,
     contact_spans,
     effort_panel,
     first_on_paper,
@@ -17,6 +16,15 @@ from davinci_forces.report.sections.parts import (
     section_of,
 )
 from davinci_forces.report.verdicts import is_out_of_log, percent
+
+LEFT_OUT = {
+    "validation": "never fitted",
+    "contact": "never fitted",
+    "leave one log out": "the log",
+    "leave one period out": "a period",
+    "leave a block of path out": "a block of path",
+    "leave a segment out": "a segment",
+}
 
 
 @section_of("Prediction", "prediction", Prediction)
