@@ -86,10 +86,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
         Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$. Below four periods they are not used.'),
     )),
     (records.Choice, (
-        Prose("**Choice of the model.** Each candidate is refitted without blocks of path, halves of it and whole "
-              "logs. Of the candidates with fixed terms, the simplest that is not clearly worse than the best is "
-              "taken; a searched model replaces it if its error is lower. “Clearly worse” is by more than one standard "
-              "error of the difference, by the jackknife over parts (Efron, 1982)."),
+        Prose("**Choice of the model.** [@choice] says which parts are left out. A candidate is “clearly "
+              "worse” by more than one standard error of the difference, by the jackknife over parts (Efron, 1982)."),
         Equation("E = overline(sqrt(sum_g norm(tau_g - Phi_g hat(theta)_(-g))^2)) / norm(tau)",
                  "the relative error, mean over ways to leave out parts, by parameters without them", "choice-error"),
     )),
@@ -130,11 +128,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "crossing rate", "detection"),
     )),
     (records.Weight, (
-        Prose("**Weighing.** A mass is fitted to the external efforts of all joints that carry it. If the "
-              "data can separate a day's offset from the load, the means over the run are subtracted on both sides, "
-              "and the offset with them. The standard error of the mass combines "
-              "the jackknife over sixths of the path with the error of the fit. It is larger if logs without a mass "
-              "show one (Birge, 1932)."),
+        Prose("**Weighing.** An offset of the day is estimated by subtracting the means over the run on both sides. "
+              "The standard error of the mass is widened as by Birge (1932)."),
         Equation('hat(m)_L = (sum_r c_r^T tau_("ext",r) \\/ epsilon_r^2) / (sum_r c_r^T c_r \\/ epsilon_r^2)',
                  "the mass: efforts per kilogram times external efforts, over their squares, weighted by the model "
                  "error", "weighing"),

@@ -116,10 +116,12 @@ def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, 
     """Middles of the equal bins of x with samples, the mean of y in each bin, and its standard error."""
     from scipy.stats import binned_statistic
 
-    count, mean, std = (binned_statistic(x, y, statistic, bins) for statistic in ("count", "mean", "std"))
-    full, n = count.statistic > 0, np.maximum(count.statistic, 1)
-    middle = (count.bin_edges[:-1] + count.bin_edges[1:]) / 2
-    return middle[full], mean.statistic[full], (std.statistic / np.sqrt(n))[full]
+    edges = np.linspace(x.min(), x.max(), bins + 1)
+    count, mean, std = (
+        np.asarray(binned_statistic(x, y, name, edges).statistic, np.float64) for name in ("count", "mean", "std")
+    )
+    full = count > 0
+    return (edges[:-1] + edges[1:])[full] / 2, mean[full], std[full] / np.sqrt(count[full])
 
 
 def correlation(x: Column, y: Column, lags: Counts) -> Column:
