@@ -35,18 +35,18 @@ class Number:
         if self.least is not None and self.value < self.least:
             return f"< {self.least:g}"
         if self.std is not None and math.isfinite(self.std) and self.std > 0:
-            return _with_std(self.value, self.std)
-        return _significant(self.value, self.digits)
+            return _with_std(self.value, self.std).replace("-", MINUS)
+        return _significant(self.value, self.digits).replace("-", MINUS)
 
 
 def _with_std(value: float, std: float) -> str:
     exponent = _exponent(max(abs(value), std), 2)
     last = _exponent(std, 2) - 1  # the power of ten of the last printed digit
     if -4 < exponent < 6 and last <= 0:
-        return _signed(f"{value:.{-last}f} ± {std:.{-last}f}")
+        return f"{value:.{-last}f} ± {std:.{-last}f}"
     decimals = max(exponent - last, 0)
     scale = 10.0**exponent
-    return _signed(f"({value / scale:.{decimals}f} ± {std / scale:.{decimals}f}) × 10{_power(exponent)}")
+    return f"({value / scale:.{decimals}f} ± {std / scale:.{decimals}f}) × {ten_to(exponent)}"
 
 
 def _significant(value: float, digits: int) -> str:
@@ -54,9 +54,9 @@ def _significant(value: float, digits: int) -> str:
         return "0"
     exponent = _exponent(value, digits)
     if -4 < exponent < 6:
-        return _signed(f"{value:.{max(digits - 1 - exponent, 0)}f}")
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    return _signed(f"{mantissa} × 10{_power(int(power))}")
+    return f"{mantissa} × {ten_to(int(power))}"
 
 
 def _exponent(value: float, digits: int) -> int:
@@ -64,9 +64,6 @@ def _exponent(value: float, digits: int) -> int:
     return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value else 0
 
 
-def _power(exponent: int) -> str:
-    return str(exponent).translate(SUPERSCRIPTS)
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", MINUS)
+def ten_to(exponent: int) -> str:
+    """A power of ten as it is printed."""
+    return f"10{str(exponent).translate(SUPERSCRIPTS)}"

@@ -30,13 +30,8 @@ drawn: "WeakKeyDictionary[Figure | Figure3D, str]" = WeakKeyDictionary()
 
 def svg(figure: Figure | Figure3D) -> str:
     """The figure as an SVG element; a figure that several reports show is drawn once."""
-    if figure not in drawn:
-        drawn[figure] = draw_svg(figure)
-    return drawn[figure]
-
-
-def draw_svg(figure: Figure | Figure3D) -> str:
-    """Draw the figure as an SVG element, without the cache of `svg`."""
+    if figure in drawn:
+        return drawn[figure]
     if isinstance(figure, Figure3D):
         marks = tuple(assign_looks(figure.marks))
         heading, height = plan_heading("", marks, PAGE_WIDTH), figure.height
@@ -46,10 +41,11 @@ def draw_svg(figure: Figure | Figure3D) -> str:
         panels, height = place_panels(figure)
         content = "".join(draw_panel(panel, f"p{i}") for i, panel in enumerate(panels))
     size = f"{PAGE_WIDTH * POINT:.6f}", f"{height * POINT:.6f}"
-    return (
+    drawn[figure] = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}pt" height="{size[1]}pt" '
         f'viewBox="0 0 {size[0]} {size[1]}">{content}</svg>'
     )
+    return drawn[figure]
 
 
 def draw_panel(panel: PlacedPanel, name: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content.number import MINUS, SUPERSCRIPTS
+from davinci_forces.report.content.number import MINUS, ten_to
 
 FEW_DECADES = 3  # axes of fewer decades are also numbered at 2 and 5
 PLAIN_RANGE = (2e-3, 2e4)  # no power of ten is taken out if the largest magnitude is in this range
@@ -69,8 +69,7 @@ class Axis:
             inside = tuple(value for value in values if low <= math.log10(value) <= high)
             return replace(self, values=inside, texts=tuple(f"{value:g}" for value in inside))
         powers = range(first, last + 1, math.ceil((last - first) / FEW_DECADES))
-        texts = tuple(f"10{str(n).translate(SUPERSCRIPTS)}" for n in powers)
-        return replace(self, values=tuple(10.0**n for n in powers), texts=texts)
+        return replace(self, values=tuple(10.0**n for n in powers), texts=tuple(map(ten_to, powers)))
 
     def with_names(self, names: Sequence[str]) -> "Axis":
         """The axis with names at 0, 1, 2, ..."""
@@ -126,6 +125,5 @@ def with_power(label: str, exponent: int) -> str:
     """An axis label with the power of ten that its numbers omit, before the unit."""
     if exponent == 0:
         return label
-    ten = f"10{str(exponent).translate(SUPERSCRIPTS)}"
     meaning, bracket, unit = label.rpartition("[")
-    return f"{meaning}[{ten} {unit}" if bracket else f"{label} [{ten}]"
+    return f"{meaning}[{ten_to(exponent)} {unit}" if bracket else f"{label} [{ten_to(exponent)}]"

@@ -145,7 +145,9 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         which = "Every log was" if every else f"{clean} of {count(len(summaries), 'log')} were"
         yield Verdict("good" if every and not diagnostics else "info", f"{which} read without a remark.")
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
-    methods = sorted({(clock(s, context), s.velocity) for s in context.catalogue.records(Signal)})
+    stated = "the rate stated in study.toml"  # of a log without a clock
+    signals = context.catalogue.records(Signal)
+    methods = sorted({(stated if context.study.log(s.log).rate else s.method, s.velocity) for s in signals})
     if methods:
         cutoff = context.study.settings.lowpass
         derived = f"differences of the position after a zero-phase low-pass at {cutoff:g} Hz"
@@ -158,11 +160,6 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
             "messages` explains them:"
         )
         yield Bullets(tuple(remarks_of_stages))
-
-
-def clock(signal: Signal, context: Context) -> str:
-    """The source of the uniform clock; a log without a clock has the rate that the study states."""
-    return "the rate stated in study.toml" if context.study.log(signal.log).rate else signal.method
 
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
