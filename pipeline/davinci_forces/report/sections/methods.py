@@ -128,8 +128,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "crossing rate", "detection"),
     )),
     (records.Weight, (
-        Prose("**Weighing.** An offset of the day is estimated by subtracting the means over the run on both sides. "
-              "The standard error of the mass is widened as by Birge (1932)."),
+        Prose("**Weighing.** An offset of the day, where the data can separate it from the load, is removed by "
+              "subtracting the means over the run on both sides. The error of the mass is widened as by Birge (1932)."),
         Equation('hat(m)_L = (sum_r c_r^T tau_("ext",r) \\/ epsilon_r^2) / (sum_r c_r^T c_r \\/ epsilon_r^2)',
                  "the mass: efforts per kilogram times external efforts, over their squares, weighted by the model "
                  "error", "weighing"),
