@@ -39,17 +39,17 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         (
             *run_cells(a),
             context.number(f"period.{a.log}", 6),
-            context.count(f"period.{a.log}.periods"),
-            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau", "relative_noise")),
+            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau")),
+            context.number(f"noise.{a.log}.{a.joint}.relative_noise", 2, std=None),
         )
         for a in averages
     )
-    header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise", "Share")
+    header = ("Log", "Joint", "Period", "Position noise", "Velocity noise", "Effort noise", "Share")
     caption = (
         "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
         "repeat, over the RMS effort. It is part of every relative error, as no model can remove it."
     )
-    yield Table(caption, header, rows, "noise-table", "llrrrrrr")
+    yield Table(caption, header, rows, "noise-table", "llrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)
