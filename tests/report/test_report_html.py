@@ -221,7 +221,7 @@ def test_a_dozen_long_traces_stay_under_five_megabytes() -> None:
 
 def test_many_traces_share_the_room_that_the_file_has_left() -> None:
     zooms = {f"trace-{i}": zoomable(30_000, f"trace-{i}") for i in range(20)}
-    shown = sum(trace.shown for trace in html._thin_figures(zooms, 1_100_000).values())
+    shown = sum(trace.samples for trace in html._thin_figures(zooms, 1_100_000).values())
     assert 90_000 < shown <= 1_100_000 / html.POINT_BYTES
 
 

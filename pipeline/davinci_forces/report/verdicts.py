@@ -15,9 +15,8 @@ DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the us
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
-MIN_NEW_PATH = (
-    0.0975  # share of a path's variance that no fitted path explains; the stage `predict` uses the same limit
-)
+# Share of a path's variance that no fitted path explains; the stage `predict` uses the same limit.
+MIN_NEW_PATH = 0.0975
 MIN_MOVING = 0.5  # share of a run in motion; at rest, friction takes any value, and the run says nothing of the model
 COVERED = (0.90, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit

@@ -12,7 +12,7 @@ from davinci_forces.report.content import Document, Equation, Figure, Figure3D, 
 from davinci_forces.report.content.inline import Span, parse, printable
 from davinci_forces.report.content.layout import columns, flatten, marked_texts, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
+from davinci_forces.report.writers.numbers import Json, numbers_json, thin_figure, thinning_note
 from davinci_forces.report.writers.pictures import NAMES, address, looks, shrink
 from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
 
@@ -58,12 +58,14 @@ def render(document: Document) -> bytes:
         "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
     still = {name: figure for name, figure in figures.items() if name not in zooms}
-    numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
-    kept = {name: (numbers_json(one.figure), one.note) for name, one in numbers.items()}
+    kept = {
+        name: (numbers_json(thin_figure(figure, STILL_POINTS) if isinstance(figure, Figure) else figure), "")
+        for name, figure in still.items()
+    }
     text = _fill(page, [*kept, *zooms])
     room = LARGEST - len(text.encode()) - sum(len(content) for content, _ in kept.values())
     traces = _thin_figures(zooms, room)
-    kept |= {name: (numbers_json(one.figure), one.note) for name, one in traces.items()}
+    kept |= {name: (numbers_json(f), thinning_note(zooms[name].samples, f.samples)) for name, f in traces.items()}
     return _put_in(text, kept).encode()
 
 
@@ -79,11 +81,11 @@ def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
     """The data URL of a figure's picture; that of a trace on screen only has few points."""
     if on_screen_only and isinstance(figure, Figure) and figure.zoomable:
-        figure = thin_figure(figure, FOLDED_POINTS).figure
+        figure = thin_figure(figure, FOLDED_POINTS)
     return address(shrink(svg(figure)))
 
 
-def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
+def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
     """Each zoomable figure in as many points as the file has room for."""
     share = room // POINT_BYTES // max(len(zooms), 1)
     limit = max(FEWEST_POINTS, min(MOST_POINTS, share))

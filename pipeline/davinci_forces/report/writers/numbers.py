@@ -3,7 +3,7 @@
 import base64
 import json
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -91,35 +91,19 @@ def _typical_step(column: Array) -> float:
     return float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
 
 
-@dataclass(frozen=True)
-class ThinnedFigure:
-    """A thinned figure, and its number of points before thinning."""
-
-    figure: Figure | Figure3D
-    samples: int
-    shown: int
-
-    @property
-    def note(self) -> str:
-        """The remark on the thinning, below the figure's caption."""
-        if self.shown == self.samples:
-            return f"All {_group_digits(self.samples)} samples are shown."
-        return f"Min–max envelope of {_group_digits(self.samples)} samples in {_group_digits(self.shown)} points."
-
-
-def thin_figure(figure: Figure | Figure3D, limit: int) -> ThinnedFigure:
-    """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all.
-
-    A figure in space is left unchanged.
-    """
-    if isinstance(figure, Figure3D):
-        samples = sum(len(mark.x) for mark in figure.marks)
-        return ThinnedFigure(figure, samples, samples)
+def thin_figure(figure: Figure, limit: int) -> Figure:
+    """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all."""
     sizes = [points_of(mark) for panel in figure.panels for mark in panel.marks]
     shares = iter(_share_points(sizes, limit))
     thinned = ((panel, tuple(thin_mark(mark, next(shares)) for mark in panel.marks)) for panel in figure.panels)
-    result = replace(figure, panels=tuple(replace(panel, marks=marks) for panel, marks in thinned))
-    return ThinnedFigure(result, figure.samples, result.samples)
+    return replace(figure, panels=tuple(replace(panel, marks=marks) for panel, marks in thinned))
+
+
+def thinning_note(samples: int, shown: int) -> str:
+    """The remark below the caption of a figure that shows so many points of its samples."""
+    if shown == samples:
+        return f"All {_group_digits(samples)} samples are shown."
+    return f"Min–max envelope of {_group_digits(samples)} samples in {_group_digits(shown)} points."
 
 
 def _share_points(sizes: list[int], limit: int) -> list[int]:
