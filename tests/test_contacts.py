@@ -474,7 +474,7 @@ def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_swing_after_a_large_push_is_no_contact_and_a_small_push_after_it_is_one(seed):
-    """Trapezoids of 3 and -0.5, and between them a swing that exceeds the alarm level, but whose interval holds zero."""
+    """Trapezoids of 3 and -0.5, and between them a swing above the alarm level whose interval holds zero."""
     corners = [(5.0, 0.0), (5.2, 3.0), (7.0, 3.0), (7.2, 0.0), (7.4, -0.12), (7.6, 0.0)]
     corners += [(9.0, 0.0), (9.2, -0.5), (10.5, -0.5), (10.7, 0.0)]
     x = smoothed(np.interp(T, *zip(*corners, strict=True)), 0.1) + slow_noise(0.04, seed)

@@ -96,7 +96,7 @@ def contacts(
         summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
         if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.peak_std:
             event = None
-        if summary is not None and (event or stated and not track.at_rest):
+        if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             rows.append((int(stated), int(event is not None), *times, *duration, *summary))

@@ -135,7 +135,9 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     peaks = largest_peaks(context, contacts)
     if not stated:
         return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
-    outside = "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
+    outside = (
+        "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
+    )
     exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level."
     return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
 
