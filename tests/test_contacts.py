@@ -434,10 +434,10 @@ def test_a_push_is_found_in_a_stated_window_that_it_fills_or_leaves():
 
 
 def test_a_log_that_identifies_holds_contacts_only_where_its_effort_is_far_from_the_rest():
-    own = slow_noise(0.05)
+    own = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
     quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.11, 0.01, "c", 1, 0.95, 0.01, 0.2)]
     about = entry(role="identification")
-    assert measured(track(own, role="contact"), quiet, entry(role="contact"))
+    assert measured(track(own, std=0.01, role="contact"), quiet, entry(role="contact"))
     assert not measured(track(own, role="identification"), quiet, about)
     touched = own + np.where((T >= 20) & (T <= 22), 2.0, 0.0)
     [contact] = measured(track(touched, role="identification"), quiet, about)
@@ -470,3 +470,20 @@ def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():
     one_each = day_offset(np.arange(2.0), np.array([0.2, 0.5]), [(-0.5, 1.5)])
     assert one_each.drift_std == pytest.approx(np.hypot(0.2, 0.5))
     assert not one_each.drifts
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_swing_after_a_large_push_is_no_contact_and_a_small_push_after_it_is_one(seed):
+    """Trapezoids of 3 and -0.5, and between them a swing above the alarm level whose interval holds zero."""
+    corners = [(5.0, 0.0), (5.2, 3.0), (7.0, 3.0), (7.2, 0.0), (7.4, -0.12), (7.6, 0.0)]
+    corners += [(9.0, 0.0), (9.2, -0.5), (10.5, -0.5), (10.7, 0.0)]
+    x = smoothed(np.interp(T, *zip(*corners, strict=True)), 0.1) + slow_noise(0.04, seed)
+    of = track(x, std=0.04, smooth_rise=0.1)
+    assert len(list(events(T, x, of.tau_ext_smooth_std, 0.105, rise=0.1))) > 2
+    quiet = [Threshold("hand_roll", "rts", 0.1, 0.01, 0.105, 0.01, "c", 1, 0.95, 0.01, 0.2)]
+    [contact] = measured(of, quiet, entry(role="contact"))
+    assert contact.peak == pytest.approx([3.0, -0.5], abs=0.2)
+    assert contact.onset == pytest.approx([5.0, 9.0], abs=0.3)
+    windows = ((5.0, 7.2), (7.3, 7.8))
+    [contact] = measured(of, quiet, entry(role="contact", contact=windows))
+    assert (contact.stated.tolist(), contact.found.tolist()) == ([1, 1, 0], [1, 0, 1])

@@ -9,9 +9,15 @@ from numpy.testing import assert_allclose
 from davinci_forces import robots
 from davinci_forces.maths.mechanics.kinematics import tip
 from davinci_forces.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report.context import Context
+from davinci_forces.report.results import Results
+from davinci_forces.report.sections.robot import section
 from davinci_forces.robots import davinci, dvrk_psm, from_toml
 from davinci_forces.robots.davinci_chain import DRIVES
 from davinci_forces.stages import design
+from davinci_forces.study import Settings, Study
+from tests.guide import make_logs
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +40,16 @@ def test_the_chain_ends_where_the_tip_is(made):
 def test_the_condition_of_the_jacobian_reaches_about_sixty_within_the_limits(made):
     [links], [workspace] = of(made, Links), of(made, Workspace)
     assert links.worst_condition == workspace.condition.max() == pytest.approx(62, abs=3)
+
+
+def test_a_jacobian_that_is_singular_within_the_limits_has_no_condition_number_and_the_report_says_why(tmp_path):
+    (tmp_path / "arm.urdf").write_text(make_logs.URDF)  # its elbow can be straight
+    robot = robots.load("arm.urdf", tmp_path)
+    made = list(design.geometry(robot, robot.chain))
+    assert np.isnan(of(made, Links)[0].worst_condition)
+    study, of_kind = Study(None, "arm", robot, True, Settings(), ()), Catalogue(lambda kind: of(made, kind))
+    page = section(Context(of_kind, study, Results(), Provenance("arm", "1", {}, {}, {}, {})))
+    assert "has no bound: the Jacobian is singular within the joints' limits" in page.blocks[0].text
 
 
 def test_pd_settles_and_its_lyapunov_function_never_rises(made):

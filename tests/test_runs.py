@@ -84,6 +84,7 @@ def test_a_second_run_runs_no_stage_and_says_so(finished):
     said = call("all", finished)
     assert "nothing to do, all stages are up to date" in said
     assert "it has not run" not in said
+    assert " of 1 up to date" not in said  # no line for each stage
     assert contents(processed(finished)) | contents(reports(finished)) == before
 
 

@@ -304,7 +304,7 @@ def together(lab, catalogue, monkeypatch):
         tested_arm.signal(joint.name, period=5.0, periods=2, rate=50.0, log="arm") for joint in lab.study.robot.joints
     ]
     motions = [tested_arm.motion(signal) for signal in signals]
-    monkeypatch.setattr(urdf, "consistent_fit", lambda export: fit)
+    monkeypatch.setattr(urdf, "consistent_fits", lambda export: [fit])
     records = Catalogue(lambda kind: motions if kind is Motion else catalogue.records(kind))
     return export_of(replace(lab.study, simulated=True), records, ORIGIN)
 
@@ -325,6 +325,33 @@ def test_the_urdf_and_its_table_say_where_they_come_from_and_what_is_missing(tog
         assert term in table
     assert "+1 m of" in table
     ElementTree.fromstring(files["arm.urdf"])
+
+
+def test_of_fits_the_urdf_takes_the_one_with_which_it_errs_least_and_says_what_it_lacks(together, monkeypatch):
+    [fit] = urdf.consistent_fits(together)
+    is_viscous = np.array([name.startswith("viscous") for name in fit.parameter])
+    worse = replace(fit, model="worse", theta=fit.theta + 100.0 * is_viscous)
+    for fits in ([fit, worse], [worse, fit]):
+        monkeypatch.setattr(urdf, "consistent_fits", lambda export, fits=fits: fits)
+        said: list[str] = []
+        files = renderer("urdf")(replace(together, say=said.append))
+        assert said[0].startswith(f"fit {'.'.join(fit.key)}: of 2")
+        assert re.search(r"^warning: a URDF cannot hold hand_roll \w+.* \d+ %", said[-1])
+        assert all(line in text for text in files.values() for line in said)
+
+
+@pytest.mark.parametrize("name", sorted(set(FORMATS) - {"urdf"}))
+def test_a_negative_spring_or_friction_is_remarked_on_and_a_negative_offset_is_not(name, small):
+    joint = small.joints[0]
+    for term in joint.model.terms:
+        theta = np.where([str(p) == term.name for p in joint.fit.parameter], -0.5, np.abs(joint.fit.theta))
+        said: list[str] = []
+        joints = (joint._replace(fit=replace(joint.fit, theta=theta)),)
+        files = renderer(name)(replace(small, joints=joints, say=said.append))
+        assert len(said) == int(term.positive or term.name == "stiffness")
+        for line in said:
+            assert f"{term.name} is negative, -0.5 +- " in line
+            assert all(line in text for text in files.values())
 
 
 def test_a_urdf_needs_newtons_and_a_chain_and_a_log_of_the_whole_arm(small):

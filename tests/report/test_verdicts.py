@@ -20,6 +20,7 @@ from davinci_forces.report.verdicts import (
     is_impossible,
     is_mostly_constant,
     mass_level,
+    percent,
     stiffness_level,
     thresholds,
     truth_level,
@@ -177,6 +178,11 @@ def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, l
 def test_a_stiffness_of_a_minority_of_pushes_is_not_good(used, level):
     """72 of 359 pushes count: the median is of the few that a straight line fits."""
     assert stiffness_level(stiffness(359, pushes=used, stiffness=320.6, stiffness_std=5.8)) == level
+
+
+def test_a_share_that_is_not_zero_is_not_printed_as_zero():
+    shares = {0.0: "0 %", 0.004: "< 1 %", 0.006: "1 %", -0.001: "0 %", 1.0: "100 %", float("nan"): "–"}
+    assert {share: percent(share) for share in shares} == shares
 
 
 def test_a_negative_mass_within_its_error_of_zero_is_not_impossible():

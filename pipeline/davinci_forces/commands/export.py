@@ -4,6 +4,8 @@ Research use, not a medical device: try it at reduced torque, with the emergency
 connects to a robot.
 """
 
+import dataclasses
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -47,7 +49,8 @@ def run(
         raise BadRequest(f"{place} exists; --replace replaces it, or --out names another folder")
     if not runs.run(folders.raw, ALL, processed, reports):
         raise BadRequest(f"{folders.raw}: a task failed, so nothing is exported; correct its log, or leave it out")
-    files = renderer(to)(permitted_export(folders, joint or [], despite_verdict))
+    export = permitted_export(folders, joint or [], despite_verdict)
+    files = renderer(to)(dataclasses.replace(export, say=partial(echo, err=True, fg="yellow")))
     write_folder(place, {name: text.encode() for name, text in files.items()}, replace)
     for name in files:
         echo(f"see {place / name}")

@@ -1,6 +1,6 @@
 """What is exported of a study: the model of each joint with errors, noise and validity, and the head of each file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, NamedTuple
@@ -30,6 +30,7 @@ from davinci_forces.robots.robot import Joint
 from davinci_forces.study import Study
 
 SAFETY = "research use, not a medical device; try at reduced effort with the stop in hand"
+SOLVER_ZERO = 1e-9  # largest size of a parameter that a solver means as 0
 FREE_ROLES = ("identification", "validation")  # of logs without contact, whose motion and effort bound the validity
 DRIVE = (inertia, stiffness, offset)  # terms of a coupled joint's drive and cables, in the order of `coupled.ADDED`
 STATIC = {"1", "sin q", "cos q", "q", "q^2", "q^3", "sin 2q", "cos 2q", "sin 3q", "cos 3q"}  # hold a resting arm
@@ -74,6 +75,7 @@ class Export:
     identified: Identified
     joints: tuple[ExportedJoint, ...]
     origin: ExportOrigin
+    say: Callable[[str], None] = lambda remark: None  # tells the user
 
     @property
     def fits(self) -> dict[str, tuple[Fit, Model]]:
@@ -92,14 +94,29 @@ class Export:
             ranges = zip(UNITS, joint.validity.values(), units, strict=True)
             text = ", ".join(f"{name} {low:.5g} to {high:.5g} {unit}" for name, (low, high), unit in ranges)
             lines.append(f"  {joint.name}: {text}")
+        lines += self.remarks()
         for fit in fits:
             rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
             lines.append(f"parameters of {'.'.join(fit.key)}, with standard errors:")
             lines += [f"  {name}: {value:.6g} +- {std:.2g} {unit}".rstrip() for name, value, std, unit in rows]
         return [visible(line) for line in lines]
 
+    def remarks(self) -> list[str]:
+        """Name negative springs, and other negative parameters that physics makes positive."""
+        advice = "in a simulation or a compensation it can drive the joint"
+        return [
+            f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
+            for fit, model in self.fits.values()
+            for about, name, value, std, unit in zip(
+                terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
+            )
+            if value < -SOLVER_ZERO and about.term and (about.term.positive or about.term == stiffness)
+        ]
+
     def document(self) -> dict[str, Any]:
-        """The model as JSON values."""
+        """The model as JSON values; its remarks are said."""
+        for remark in self.remarks():
+            self.say(remark)
         robot, origin = self.study.robot, self.origin
         return {
             "head": self.head(), "report_id": origin.report_id, "version": origin.version, "robot": robot.name,

@@ -4,7 +4,7 @@ theta = A x: many bodies x have the identified parameters.  Those nearest to the
 are written; drives, cables and offsets get what no body can explain.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from davinci_forces.maths.mechanics.bodies import PARAMETERS, as_bodies
 from davinci_forces.maths.models.coupled import ADDED, CoupledArm
 from davinci_forces.maths.models.independent import add
 from davinci_forces.maths.models.memory import friction_state
-from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import coulomb, viscous
 from davinci_forces.records import Average, Fit, Motion
 from davinci_forces.robots.models import ARM
@@ -59,16 +59,25 @@ def render(export: Export) -> dict[str, str]:
     missing += ["the geometry of the robot: state its chain"] * (robot.chain is None)
     if missing:
         raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json and c do not")
-    arm = completed_arm(robot, consistent_fit(export))
+    arms = [completed_arm(robot, fit) for fit in consistent_fits(export)]
+    arm = min(arms, key=lambda arm: (_left_out_error(export, arm), len(arm.fit.theta)))
+    own = replace(export, joints=tuple(joint._replace(fit=arm.fit, model=arm.model) for joint in export.joints))
     near = "nearest to the robot's guesses" if robot.bodies else "of the least mass"
-    fit = ".".join(arm.fit.key)
-    note = [f"fit {fit}; of all bodies that have it, those {near}; {TABLE}: what a URDF does not hold"]
-    urdf = writing.text(arm.robot, export.head(arm.fit) + note, arm.friction)
-    return {"arm.urdf": urdf, TABLE: "\n".join([*export.head(), *note, *_tables(export, arm)]) + "\n"}
+    lost = _lost(export, arm)
+    lacks = ", ".join(f"{row[0]} {row[1]} {row[-1]}" for row in lost if float(row[-1].split()[0]) >= 1.0)
+    note = [
+        f"fit {'.'.join(arm.fit.key)}: of {len(arms)} with possible bodies, its URDF errs least in logs left out",
+        f"of all bodies that have it, those {near}",
+        f"warning: a URDF cannot hold {lacks or 'terms with less than 1 %'} of the joint's effort; {TABLE} lists all",
+    ]
+    for line in (*own.remarks(), note[0], note[-1]):
+        export.say(line)
+    urdf = writing.text(arm.robot, own.head(arm.fit) + note, arm.friction)
+    return {"arm.urdf": urdf, TABLE: "\n".join([*own.head(), *note, *_tables(export, arm, lost)]) + "\n"}
 
 
-def consistent_fit(export: Export) -> Fit:
-    """The consistent fit of all moving joints as one arm: the one in the records, or a new one from the same logs.
+def consistent_fits(export: Export) -> list[Fit]:
+    """The consistent fits of all moving joints as one arm: those in the records, or a new one from the same logs.
 
     Raises
     ------
@@ -85,7 +94,7 @@ def consistent_fit(export: Export) -> Fit:
         raise BadRequest(f"{study.name}: a URDF is of the whole arm; leave --joint out")
     arms = [fit for fit in identified.fits if (fit.group, fit.estimator) == (ARM, CONSISTENT)]
     if recorded := [fit for fit in arms if set(identified.model(fit).efforts) == moving]:
-        return min(recorded, key=lambda fit: len(fit.theta))
+        return recorded
     motions = export.catalogue.select(Motion, role="identification")
     logs = logs_of(motions, export.catalogue.records(Average), study.robot, study.settings.lowpass)
     separate, together = modelled_logs(logs, study.robot)
@@ -95,7 +104,7 @@ def consistent_fit(export: Export) -> Fit:
     selection = select_candidate(shared, len(logs)) if shared else None
     for record in fits(selection.chosen, shared, len(logs), study.robot, True) if selection else ():
         if isinstance(record, Fit) and record.estimator == CONSISTENT:
-            return record
+            return [record]
     raise BadRequest(f"{study.name}: a URDF needs bodies, and no identification log moves the joints together")
 
 
@@ -125,7 +134,7 @@ def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: 
     return value * effort
 
 
-def _tables(export: Export, arm: IdentifiedArm) -> Iterator[str]:
+def _tables(export: Export, arm: IdentifiedArm, lost: Sequence[tuple[str, ...]]) -> Iterator[str]:
     fit, names = arm.fit, [f"{which} of {link}" for link in arm.model.chain.links for which in PARAMETERS]
     rows = arm.model.mechanism.matrix[: len(arm.model.base.columns), : len(names)]
     sums = [
@@ -136,30 +145,60 @@ def _tables(export: Export, arm: IdentifiedArm) -> Iterator[str]:
     yield "\n# Identified parameters\n\nOnly these combinations follow from the logs."
     yield from _table("parameter", "value", "standard error", "unit", "combination")
     yield from (_row(name, f"{value:.6g}", f"{std:.2g}", unit, text) for name, value, std, unit, text in numbers)
-    yield from _efforts(export, arm)
-
-
-def _efforts(export: Export, arm: IdentifiedArm) -> Iterator[str]:
-    """What URDF cannot hold, and the error of both models, over the logs of free motion."""
-    free = [motion for motion in export.catalogue.records(Motion) if motion.role in FREE_ROLES]
-    logs = [[motion for motion in free if motion.log == log] for log in dict.fromkeys(motion.log for motion in free)]
-    whole = [log for log in logs if len(log) == len(arm.model.joints) and len({len(motion) for motion in log}) == 1]
-    along = [LogModels(export.identified, log) for log in whole]
-    tau = {name: [motion.tau for log in whole for motion in log if motion.joint == name] for name in arm.model.joints}
     yield "\n# What the URDF does not hold\n\nShare: of the root mean square of the measured effort in free motion."
     yield from _table("joint", "term", "value", "unit", "share")
+    yield from (_row(*cells) for cells in lost)
+    yield "\n# Error of the models\n\nRoot mean square of measured minus modelled effort over all logs of free motion,"
+    yield "with its noise. The report's model error is without that noise, in one log that was not fitted."
+    yield from _table("joint", "unit", "effort", "URDF alone", "this fit", "chosen model")
+    along, tau = _free_logs(export, arm.model)
+    for name, joint, fit, *_ in export.joints:
+        hats = (
+            [_held(arm, log, name) for log in along],
+            *([log.tau_hat(f, name) for log in along] for f in (arm.fit, fit)),
+        )
+        errors = (_rms(tau[name]), *(_error(tau, name, hat) for hat in hats))
+        yield _row(name, joint.unit("{effort}"), *(f"{number:.4g}" for number in errors))
+
+
+def _lost(export: Export, arm: IdentifiedArm) -> list[tuple[str, ...]]:
+    """What URDF cannot hold: joint, term, value, unit and share of the effort over the logs of free motion."""
+    rows, (along, tau) = list[tuple[str, ...]](), _free_logs(export, arm.model)
     for about, value in arm.remainder.items():
         assert about.term
         effort = (remaining_effort(about, value, arm.model, log.motion(arm.fit, about.joint)) for log in along)
         name = ADDED[DRIVE.index(about.term)] if about.term in DRIVE else about.term.name
         unit = export.study.robot.joint(about.joint).unit(about.term.unit)
-        yield _row(about.joint, name, f"{value:.5g}", unit, f"{100 * _rms(effort) / _rms(tau[about.joint]):.2g} %")
-    yield "\n# Error of the models, where fitted and validated, root mean square"
-    yield from _table("joint", "unit", "effort", "this fit", "chosen model")
-    for name, joint, fit, *_ in export.joints:
-        hats = ([log.tau_hat(f, name) for log in along] for f in (arm.fit, fit))
-        errors = (_rms(map(np.subtract, tau[name], hat)) for hat in hats)
-        yield _row(name, joint.unit("{effort}"), *(f"{number:.4g}" for number in (_rms(tau[name]), *errors)))
+        rows.append((about.joint, name, f"{value:.5g}", unit, f"{100 * _rms(effort) / _rms(tau[about.joint]):.2g} %"))
+    return rows
+
+
+def _left_out_error(export: Export, arm: IdentifiedArm) -> float:
+    """The error of what a URDF holds, over the effort, summed over joints, in logs for validation; else in all logs."""
+    along, tau = _free_logs(export, arm.model, ("validation",))
+    along, tau = (along, tau) if along else _free_logs(export, arm.model)
+    return sum(_error(tau, name, (_held(arm, log, name) for log in along)) / _rms(tau[name]) for name in tau if along)
+
+
+def _held(arm: IdentifiedArm, log: LogModels, name: str) -> Array:
+    """The effort (N,) of a joint by what the URDF holds."""
+    motion, lost = log.motion(arm.fit, name), [item for item in arm.remainder.items() if item[0].joint == name]
+    return log.tau_hat(arm.fit, name) - sum(remaining_effort(*term, arm.model, motion) for term in lost)
+
+
+def _free_logs(
+    export: Export, model: Model, roles: Sequence[str] = FREE_ROLES
+) -> tuple[list[LogModels], dict[str, list[Array]]]:
+    """The logs of free motion that hold all joints of a model, and the efforts of each joint in them."""
+    free = [motion for motion in export.catalogue.records(Motion) if motion.role in roles]
+    logs = [[motion for motion in free if motion.log == log] for log in dict.fromkeys(motion.log for motion in free)]
+    whole = [log for log in logs if len(log) == len(model.joints) and len({len(motion) for motion in log}) == 1]
+    tau = {name: [motion.tau for log in whole for motion in log if motion.joint == name] for name in model.joints}
+    return [LogModels(export.identified, log) for log in whole], tau
+
+
+def _error(tau: Mapping[str, Sequence[Array]], name: str, tau_hat: Iterable[Array]) -> float:
+    return _rms(map(np.subtract, tau[name], tau_hat))
 
 
 def _rms(signals: Iterable[Array]) -> float:

@@ -212,7 +212,7 @@ def band_in_words(coverage: float) -> str:
 
 def percent(share: float) -> str:
     """A share as it is printed."""
-    return "–" if math.isnan(share) else f"{round(100 * share) + 0:d} %"
+    return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else f"{round(100 * share) + 0:d} %"
 
 
 def thresholds() -> tuple[tuple[Cell, ...], ...]:

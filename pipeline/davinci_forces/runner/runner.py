@@ -154,15 +154,19 @@ class Runner:
         self._open = Counter(map(stage_of, self._progress))  # number of steps of each stage that are not done
         for part in graph.parts:
             self._progress[part.step].unplanned += _has_tasks(part)
+        self._unchanged: list[str] = []  # lines that end the run
         self._due: dict[Part, int] = {}  # number of tasks that are not done
         while True:
             for batch in iter(graph.next, []):
                 self._begin(graph, batch)
             if self._crew.idle:
-                return
+                break
             for outcome in self._crew.outcomes():
                 self._record(outcome)
                 self._count_done(graph, _part(outcome.task.step, outcome.task.name))
+        if self.ran or len(self._named) == 1:  # else `nothing to do` says it in one line
+            for line in self._unchanged:
+                self.console.say(line)
 
     def _begin(self, graph: Graph, batch: Sequence[Part]) -> None:
         """Plan parts of a step, and submit their tasks that are not up to date."""
@@ -193,16 +197,16 @@ class Runner:
                 self._conclude(stage_of(part.step))
 
     def _conclude(self, stage: str) -> None:
-        """Print how many tasks of a named stage were up to date, once its last step is done."""
+        """Note how many tasks of a named stage were up to date, once its last step is done."""
         self._open[stage] -= 1
         if self._open[stage] or stage not in self._named:
             return
         steps = [progress for step, progress in self._progress.items() if stage_of(step) == stage]
         current, tasks = sum(step.current for step in steps), sum(step.tasks for step in steps)
         if current:
-            self.console.say(f"{stage}: {current} of {tasks} up to date")
+            self._unchanged.append(f"{stage}: {current} of {tasks} up to date")
         if not tasks:
-            self.console.say(f"{stage}: the study has no data for it")
+            self._unchanged.append(f"{stage}: the study has no data for it")
 
     def _plan_part(self, part: Part) -> list[Task]:
         """The tasks of a part that have to run; outputs of its former tasks are removed."""

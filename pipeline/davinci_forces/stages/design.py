@@ -42,7 +42,8 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
         grid = np.array(list(product(*(np.linspace(low, high, GRID_POINTS) for low, high in limits.tolist()))))
         # Where the Jacobian is singular, the largest number stands for infinity, which no record holds.
         condition = np.minimum(tip_force.condition(jacobian(chain, grid)[0]), np.finfo(float).max)
-    yield links(robot, chain, float(condition.max()) if limited else float("nan"))
+    worst = float(condition.max()) if limited else float("nan")
+    yield links(robot, chain, worst if worst < np.finfo(float).max else float("nan"))
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
     for name, q in poses.items():
         x, y, z = frames(chain, q)[:, :3, 3].T

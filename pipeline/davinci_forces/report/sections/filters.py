@@ -18,7 +18,7 @@ from davinci_forces.report.content import (
     Table,
     literal,
 )
-from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 
 SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
@@ -174,7 +174,7 @@ def overlay(compared: list[Comparison]) -> Figure:
     return Figure(
         "External effort in free motion by four filters. The true one is 0; the deviation is mainly the model's error, "
         "which all filters share. The smoother has no delay.",
-        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst run of {len(joints)} joints.",
+        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst run of {count(len(joints), 'joint')}.",
         panels,
         "filters-figure",
         columns=1,
@@ -195,7 +195,7 @@ def noise_over_delay(noises: list[FilterNoise]) -> Figure:
         f"Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown "
         f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
         "",
-        f"Noise of the filter over its delay for {len(noises)} joints.",
+        f"Noise of the filter over its delay for {count(len(noises), 'joint')}.",
         panels,
         "noise-over-delay",
         height=35,

@@ -8,6 +8,7 @@ import numpy as np
 from davinci_forces.records import Column, Links, Pose, Workspace
 from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
 from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.content.number import MISSING
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of, strokes
 
@@ -15,7 +16,7 @@ from davinci_forces.report.sections.parts import section_of, strokes
 @section_of("The robot", "robot", Links)
 def section(context: Context, records: list[Links]) -> Iterator[Block]:
     """The chain and its table.  Tables 3.1, 4.2, Fig 3.5"""
-    links, worst = records[0], context.results["robot.worst_condition"].number(3)
+    links, worst = records[0], context.number("robot.worst_condition", 3)
     tabulated = not np.isnan(links.alpha).all()
     chain_kind = "a Denavit-Hartenberg chain" if tabulated else "a tree of links"
     shared = max(Counter(links.moved_by[links.moved_by > 0].tolist()).values(), default=0) > 1
@@ -25,8 +26,13 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
     )
     yield Prose(
         f"The {literal(context.study.robot.title)} is modelled as {chain_kind}. {parallelogram if shared else ''}"
-        "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
-        f"{worst} within the joints' limits: this factor can multiply the relative error of an effort."
+        "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number, which can "
+        "multiply the relative error of an effort, "
+        + (
+            "has no bound: the Jacobian is singular within the joints' limits, or a joint has no limits."
+            if worst == MISSING
+            else f"reaches {worst} within the joints' limits."
+        )
     )
     rows = []
     for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):

@@ -27,15 +27,15 @@ COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
 SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
 ROWS = (
     *((f"hand_{name}", f"{name.capitalize()} of the hand", "assumed") for name in ("mass", "damping", "stiffness")),
-    ("k_t_limit", "**Limit**: formula, measured filter", SAME),
+    ("k_t_limit", "**Limit**: formula", SAME),
     ("k_t_response", "Linear response", SAME),
     ("k_t_simulated", "Simulation", SAME),
     ("k_t_settles", "Simulation, all effects", f"{SAME}; friction of the arm, damping of the tissue"),
     ("k_t_cqlf", "Lyapunov function", NO_DELAY),
     ("k_t_switching", "Worst switching", NO_DELAY),
     ("limit_frequency", "Frequency at the limit", ""),
-    ("filter_lag", "Filter’s lag, in logs", "at that frequency"),
-    ("filter_share", "Filter’s gain, in logs", "at that frequency"),
+    ("filter_lag", "Filter’s lag", "at that frequency; in logs, if its error is stated"),
+    ("filter_share", "Filter’s gain", "at that frequency; in logs, if its error is stated"),
     ("loop_delay", "Delay of the felt force", "filter, arm, link, sampling"),
     ("felt_damping", "Damping felt in free motion", "filter’s error; negative values drive the hand"),
     ("best_delay", "Added delay with the highest limit", "by the response"),
@@ -77,8 +77,10 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
     if np.isnan(limit.filter_lag_std):
         side = "above" if limit.k_t_limit > stiffest.stiffness else "below"
         text = f"Hand “{name}”: the limit, {headline}, is {side} the measured tissue, {tissue}."
-        why = "The filter's lag is assumed, not measured in logs, so stability is not rated."
-        return Verdict("info", f"{text} {why}")
+        lag = context.number(f"{key}.filter_lag", 2)
+        why = f"The filter's lag, {lag}, is assumed, or is of short logs, so stability is not rated."
+        remedy = "To measure it, record more free motion of the prismatic joint, also for identification."
+        return Verdict("info", f"{text} {why} {remedy}")
     stable = limit.k_t_limit - half > stiffest.stiffness and limit.delay_margin != 0.0  # NaN if no delay is too much
     words = f"{'**stable** against' if stable else 'may oscillate against'} the measured tissue, {tissue}"
     if limit.k_t_limit + half < stiffest.stiffness:
@@ -100,8 +102,8 @@ def model(context: Context, limits: list[HandLimit]) -> str:
         "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
         f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is "
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
-        "state the same limit: the formula takes the filter's lag and gain from logs, at the frequency at which the "
-        "hand would oscillate; the response and the simulation contain the filter itself. "
+        "state the same limit: the formula takes the filter's lag and gain, from logs if there are any, at the "
+        "frequency at which the hand would oscillate; the response and the simulation contain the filter itself. "
         f"{agree}The last column of [@stability-table] says what each row includes. Try other hands: `davinci-forces "
         "stability --help`."
     )

@@ -8,7 +8,7 @@ from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_part
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
@@ -40,7 +40,8 @@ def track_effort(
     parts, moving = filter_inputs(model), (model.unscored == 0) | bool(model.at_rest)
     offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    estimate = filter_parts(DEFAULT, parts, noise, ("tau_ext", "tau_ext_std", "nis"))
+    is_long = len(model) > BLOCK_SAMPLES  # then the filter runs once more, block by block, to take less memory
+    estimate = filter_parts(DEFAULT, parts, noise, ("tau_ext", "tau_ext_std", "nis") if is_long else Tracked._fields)
     if diverges(estimate):
         yield divergence_warning(model, float(np.mean(estimate.nis)))
         if not np.isfinite(estimate.tau_ext).all():
@@ -48,22 +49,20 @@ def track_effort(
     if offset.drifts:
         yield drift_warning(model, offset)
     numbers = numbers_of(estimate, offset, converged, free_space(model.t, entry.contact, model.rate, model.unscored))
+    blocks = gather_blocks(filter_blocks(DEFAULT, parts, noise)) if is_long else [(slice(0, len(model)), estimate)]
     del estimate
     smoothed, own = filter_parts(SMOOTHER, parts, noise, ("tau_ext", "tau_ext_std"))[2:4]
     late = lag_error(parts, smoothed, noise)
     variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
-    excess = own**2
-    model_part = float(np.sqrt(np.mean(np.maximum(np.subtract(variance, excess, out=excess), 0.0, out=excess))))
-    np.minimum(own, np.sqrt(variance, out=excess), out=excess)
+    model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
     numbers |= {
         "model_part": model_part,
         "model_part_std": float(np.sqrt(model_part**2 + variance_std)) - model_part,
         "lag_part": rms(late[converged]),
-        "smooth_part": rms(excess[converged]),
+        "smooth_part": rms(np.minimum(own, np.sqrt(variance))[converged]),
         "smooth_rise": rise(rts.track, parts[0], noise),
     }
-    del excess
-    for rows, estimate in gather_blocks(filter_blocks(DEFAULT, parts, noise)):
+    for rows, estimate in blocks:
         part = model.part(rows)
         # At standstill, friction is anywhere between its static levels: a uniform distribution.
         friction = part.standing * part.static_friction**2 / 3.0

@@ -7,6 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.detection import Event, events, summarise, typical_alarm_level
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
@@ -80,7 +81,10 @@ def level_while_identified(track: Track, entry: LogEntry) -> float:
 def contacts(
     track: Track, threshold: Threshold, placed: Sequence[tuple[Window, Event | None, bool]]
 ) -> Iterator[Contact]:
-    """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
+    """The Contact of one joint of a log, if any sample lies in one of the joint's contacts.
+
+    A contact is not found if the 95 % interval of its peak holds zero, as where the arm swings after a larger push.
+    """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
     free = free if free.any() else free_smoothed(track.t, windows, track.rate)
@@ -90,7 +94,9 @@ def contacts(
     for window, event, stated in placed:
         effort = track.tau_ext_smooth, track.tau_ext_smooth_std
         summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
-        if summary is not None:
+        if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.peak_std:
+            event = None
+        if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             rows.append((int(stated), int(event is not None), *times, *duration, *summary))

@@ -97,7 +97,7 @@ def rule_in_words(trusts: list[Trust]) -> str:
     by_level = "detection level over the effort sought"
     by_error = "model error over effort"
     rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
-    worst = "Each row is a joint's worst run (one joint in one log) that was not fitted."
+    worst = "A run is one joint in one log; runs that were not fitted decide, if there are any."
     return f"{worst} Verdicts follow from {rule}, by [@thresholds]."
 
 
@@ -119,24 +119,27 @@ def fitted_joints(context: Context) -> list[str]:
 def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
     logs = len({track.log for track in context.catalogue.records(Track)})
-    windows = sum(len(contact) for contact in contacts)
-    above = sum(int(contact.above.sum()) for contact in contacts)
+    stated = sum(int(contact.stated.sum()) for contact in contacts)
+    above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
+    unstated = count(sum(len(contact) for contact in contacts) - stated, "contact")
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(trusts), 'joint')} of the {literal(context.study.robot.title)}, in {logs} of "
         f"{count(len(context.study.logs), 'log')}. "
         f"{logs_in_words(context)}"
     )
-    if not windows:
+    if not contacts:
         contact_logs = any(log.role == "contact" for log in context.study.logs)
         why = "none was found, and the study states none" if contact_logs else "no log has the role contact"
         return f"{text} No contact is measured: {why}."
-    text = f"{text} A window counts as a contact for every joint on which it is measured."
-    contacts_in_words = count(windows, "contact")
     peaks = largest_peaks(context, contacts)
-    if not any(contact.stated.any() for contact in contacts):
-        return f"{text} **{contacts_in_words} found above the alarm level; the study states none.{peaks}**"
-    return f"{text} **In {above} of {contacts_in_words}, the effort exceeds the detection level.{peaks}**"
+    if not stated:
+        return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
+    outside = (
+        "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
+    )
+    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level."
+    return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
 
 
 def largest_peaks(context: Context, contacts: list[Contact]) -> str:
@@ -214,11 +217,12 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     caption = (
-        "Trust in the estimates. New path: share of the run's motion that is unlike any fitted path. Model error: RMS "
-        "of measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of "
-        "the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 "
-        "% of free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard "
-        "error."
+        "Trust in the estimates. New path to Ceiling are of the joint's run with the largest model error; Detection "
+        "level and Coverage are of that with the highest level. New path: share of the run's motion that is unlike any "
+        "fitted path. Model error: RMS of measured minus modelled effort, both low-passed, without noise. "
+        "Error/effort: model error over the RMS of the measured effort; $R^2$ includes the noise. Ceiling: largest "
+        "$R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: share of free-space "
+        "samples in the 95 % band. ± is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
@@ -232,7 +236,7 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
         row += ["–"] * 4
     else:
         r2 = context.number(f"{p.prefix}.r2", 2)
-        ceiling = context.number(f"{p.prefix}.r2_ceiling", 2, std=None)
+        ceiling = context.number(f"{p.prefix}.r2_ceiling", 4, std=None)
         row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
     key = space.prefix if space is not None else ""
     row.append(context.number(f"{key}.detection_level", 2))
