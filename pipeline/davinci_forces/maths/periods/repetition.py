@@ -83,12 +83,14 @@ def _search(x: Array) -> Repetition | None:
     n = x.shape[1] // factor
     points = x[:, : n * factor].reshape(len(x), n, factor).mean(axis=2)
     lags = {lag.lag: lag for lag in _lags(points)}
-    lows = {lag: _lowest(lags, lag) for lag in lags if _is_low(lags, lag)}
+    least = {lag: float(lags[lag].difference.min()) for lag in lags}
+    around = {lag: (least.get(lag - 1, np.inf), least[lag], least.get(lag + 1, np.inf)) for lag in lags}
+    lows = {lag: vertex(*near)[1] for lag, near in around.items() if near[1] == min(near) and near[1] <= 2 * DIP}
     best = min(lows.values(), default=np.inf)
     if best > DIP:
         return None
     good = [lag for lag, value in lows.items() if value <= MAX_RATIO_PERIOD * best + ROUNDED]
-    bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * _least(lags[lag]), MIN_BOUND_RUN) for lag in good}
+    bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * least[lag], MIN_BOUND_RUN) for lag in good}
     runs = {lag: _longest(lags[lag], min(bound, DIP)) for lag, bound in bounds.items()}
     longest = max(stop - start for start, stop in runs.values())
     if longest < MIN_RUN_SHARE * n:
@@ -103,7 +105,7 @@ def _search(x: Array) -> Repetition | None:
 def _shortest(lags: list[int], x: Array) -> float:
     """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that lag."""
     steps = [max(1, lag // LAG_PARTS) for lag in lags]
-    least = [_vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
+    least = [vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
     for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
         if value <= MAX_RATIO_PERIOD * least[-1][1] + ROUNDED:
             return lag + step * shift
@@ -115,7 +117,7 @@ def _apart(x: Array, lag: int) -> float:
     return float(((x[:, lag:] - x[:, :-lag]) ** 2).mean() / (2 * x.var(axis=1).mean()))
 
 
-def _vertex(before: float, middle: float, after: float) -> tuple[float, float]:
+def vertex(before: float, middle: float, after: float) -> tuple[float, float]:
     """Lowest point of the parabola through three neighbours: its place relative to the middle one, and its value.
 
     The point lies no further than the neighbours, because noise would determine a point beyond them.
@@ -150,19 +152,3 @@ def _longest(lag: Lag, most: float) -> tuple[int, int]:
         return 0, 0
     at = int((edges[1::2] - edges[::2]).argmax())
     return int(edges[2 * at]), int(edges[2 * at + 1]) - 1 + 2 * lag.lag
-
-
-def _least(lag: Lag) -> float:
-    return float(lag.difference.min())
-
-
-def _is_low(lags: dict[int, Lag], lag: int) -> bool:
-    here = _least(lags[lag])
-    return here <= DIP * 2 and all(here <= _least(lags[near]) for near in (lag - 1, lag + 1) if near in lags)
-
-
-def _lowest(lags: dict[int, Lag], lag: int) -> float:
-    """Least difference of the halves of any span around a lag, interpolated between points."""
-    if lag - 1 not in lags or lag + 1 not in lags:
-        return _least(lags[lag])
-    return _vertex(*(_least(lags[near]) for near in (lag - 1, lag, lag + 1)))[1]
