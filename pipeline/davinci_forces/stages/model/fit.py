@@ -12,7 +12,6 @@ from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regress
 from davinci_forces.identification.candidates import Library, variants, with_every_term
 from davinci_forces.identification.identifiability import (
     advice,
-    correlation_entries,
     describe_correlated,
     describe_insignificant,
     hardly_described,
@@ -186,7 +185,7 @@ def identifiability(
         advice=advice(robot, joint, (*pairs, *insignificant)),
         parameter=np.repeat(np.array(names, object), len(names)),
         beside=np.tile(np.array(names, object), len(names)),
-        correlation=correlation_entries(excitation),
+        correlation=excitation.correlation.ravel(),
     )
     wrong = [name for name, estimate in estimates.items() if not has_positive_inertia(model, estimate.theta, parts)]
     if wrong:
@@ -233,7 +232,7 @@ def r_squared(regression: Regression, estimate: Estimate) -> float:
 def periodic_part(model: IndependentJoint, t: Trajectory, prior: Prior = NO_PRIOR) -> Part:
     """Regression over an averaged period; `prior` holds parameters from tables."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
-    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior), t)
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, t, prior), t)
 
 
 def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Prior) -> Part:
