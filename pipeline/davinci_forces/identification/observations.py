@@ -19,12 +19,12 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.memory import select_samples as first_samples
 from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.periods.agreement import repetitions
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
     PATH_BLOCKS,
     Equations,
     path_blocks,
-    repetitions,
     side_by_side,
     sum_equations,
 )

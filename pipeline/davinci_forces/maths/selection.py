@@ -166,11 +166,6 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
     return np.asarray((elapsed / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
 
 
-def repetitions(t: Array, period: float) -> Integers:
-    """The period of each sample (N,), counted from 0; the last one need not be whole."""
-    return np.asarray(((t - t[0]) / period + 1e-9).astype(np.int64))
-
-
 def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
     """Schemes (G, C) of the cells that each of G groups leaves out; a cell is a block of one log.
 

@@ -106,10 +106,9 @@ def _shortest(lags: list[int], x: Array) -> float:
     """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that lag."""
     steps = [max(1, lag // LAG_PARTS) for lag in lags]
     least = [vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
-    for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
-        if value <= MAX_RATIO_PERIOD * least[-1][1] + ROUNDED:
-            return lag + step * shift
-    raise AssertionError("the last lag is as good as itself")
+    bound = MAX_RATIO_PERIOD * least[-1][1] + ROUNDED
+    found = zip(lags, steps, least, strict=True)
+    return next(lag + step * shift for lag, step, (shift, value) in found if value <= bound)
 
 
 def _apart(x: Array, lag: int) -> float:

@@ -68,10 +68,8 @@ def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, floa
     if len(steps) < 2 * SMOOTHED:
         return 0.0, 0.0
     x, y = (np.convolve(column, mean, "valid") for column in (steps, 0.5 * (dq[1:] + dq[:-1])))
-    x, y = x - x.mean(), y - y.mean()
-    if not (x @ x > 0 and y @ y > 0):
-        return 0.0, 0.0
-    return float(x @ y / np.sqrt((x @ x) * (y @ y))), float(np.sqrt((y @ y) / (x @ x)))
+    (xx, xy), (_, yy) = np.cov(x, y).tolist()
+    return (xy / math.sqrt(xx * yy), math.sqrt(yy / xx)) if xx * yy > 0.0 else (0.0, 0.0)
 
 
 def round_rate(rate: float) -> float:
