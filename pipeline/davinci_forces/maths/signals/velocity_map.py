@@ -24,9 +24,9 @@ def over_velocity(dq: Array, ddq: Array, signals: Array) -> VelocityMap:
     edges = float(np.abs(dq).max() or 1.0) * np.linspace(-1.0, 1.0, 2 * RANGES + 1)
     range_of_sample = np.clip(np.digitize(dq, edges) - 1, 0, 2 * RANGES - 1)
     gaining = dq * ddq > 0
-    groups = [(range_of_sample == n) & (gaining == gains) for n in range(2 * RANGES) for gains in (True, False)]
+    groups = [(range_of_sample == n) & (gaining == way) for n in range(2 * RANGES) for way in (True, False)]
     parts = [part for part in groups if np.count_nonzero(part) >= MIN_SAMPLES_RANGE]
-    mean, std = (np.array([f(signals[part], axis=0) for part in parts]) for f in (np.mean, np.std))
-    dq_of_parts, gains = (np.array([x[part].mean() for part in parts]) for x in (dq, gaining))
-    columns = (x.reshape(len(parts), signals.shape[1]) for x in (mean, std))
-    return VelocityMap(dq_of_parts, gains > 0.0, *columns)
+    shape = len(parts), signals.shape[1]
+    mean, std = (np.array([f(signals[part], axis=0) for part in parts]).reshape(shape) for f in (np.mean, np.std))
+    gains = np.array([gaining[part].all() for part in parts], np.bool_)
+    return VelocityMap(np.array([dq[part].mean() for part in parts]), gains, mean, std)
