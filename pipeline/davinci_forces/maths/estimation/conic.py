@@ -52,7 +52,6 @@ class ConsistentParameters(NamedTuple):
     theta: Array  # (p,)
     x: Array  # (n,)
     excess: float  # of the squared residuals over their minimum, as a share of the effort's square
-    gap: float  # bound of the distance to the optimum, as a share of the effort's square
 
 
 class Cones(NamedTuple):
@@ -75,13 +74,13 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
         If the solver does not converge.
     """
     if not mechanism.links and (R.theta[mechanism.positive] >= 0).all():
-        return ConsistentParameters(R.theta, R.theta, 0.0, 0.0)
+        return ConsistentParameters(R.theta, R.theta, 0.0)
     F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.min_squares))
     cones = scale_unknowns(F, mechanism)
-    z, gap = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
+    z = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
     x = np.asarray(cones.scale[:, cones.seen] @ z * size)
     theta = np.asarray(mechanism.matrix @ x)
-    return ConsistentParameters(theta, x, float(R.excess(theta)) / size**2, gap)
+    return ConsistentParameters(theta, x, float(R.excess(theta)) / size**2)
 
 
 def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:
@@ -130,8 +129,8 @@ def scales_of_entries(size: Array, least: float) -> Array:
     return np.array([T[i] * T[j] for i, j in ENTRIES])
 
 
-def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
-    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges; return z and the gap.
+def solve(F: csc_array, y: Array, cones: Cones) -> Array:
+    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges.
 
     Raises
     ------
@@ -141,7 +140,7 @@ def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
     for price in PRICES:
         z, gap, status = solve_at_price(F, y, cones, price)
         if gap <= MAX_GAP_SOLVER:
-            return z, gap
+            return z
     raise NotIdentifiable(
         f"the conic program was not solved ({status}): it may miss the optimum by {gap:.1e} of the effort's square"
     )
