@@ -119,7 +119,7 @@ def count_uncorrelated(x: Array) -> float:
 
     The autocovariance is computed block by block, and as far as its first zero, because a series may be long.
     """
-    centred, N, lags, covariance = x - x.mean(), len(x), BLOCK_SAMPLES // 4, np.ones(1)
+    centred, N, lags, covariance = x - x.mean(), len(x), BLOCK_SAMPLES // 64, np.ones(1)
     while covariance.min() >= 0.0 and len(covariance) < N:
         lags, covariance = min(2 * lags, N), np.zeros(min(2 * lags, N))
         for start in range(0, N, lags):
