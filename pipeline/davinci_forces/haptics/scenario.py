@@ -120,7 +120,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     """Build the scenario of a file, with problems noted."""
     default = HapticScenario()
     link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
-    device, in_loop = table.table("device"), table.table("filter")
+    device, loop_filter = table.table("device"), table.table("filter")
     scenario = HapticScenario(
         title=table.text("title", default.title),
         seed=table.whole("seed", default.seed),
@@ -143,9 +143,9 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         stops=read_stops(arm, default.stops),
         body=_body(arm.table("body")) if "body" in arm else None,
         noise=_noise(arm.table("noise")) if "noise" in arm else None,
-        assumed_body=_body(in_loop.table("body")) if "body" in in_loop else None,
-        filtered=in_loop.text("use", "ekf", ("ekf", "none")) == "ekf",
-        q_tau=in_loop.number("q_tau", default.q_tau, low=0.0),
+        assumed_body=_body(loop_filter.table("body")) if "body" in loop_filter else None,
+        filtered=loop_filter.text("use", "ekf", ("ekf", "none")) == "ekf",
+        q_tau=loop_filter.number("q_tau", default.q_tau, low=0.0),
         stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
         damping=tissue.number("damping", default.damping, low=0.0),
         friction=tissue.number("friction", default.friction, low=0.0),
@@ -154,7 +154,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     if scenario.friction >= 1.0:
         problem = f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls"
         tissue.problem(problem, "friction")
-    for part in (device, link, arm, in_loop, tissue, table):
+    for part in (device, link, arm, loop_filter, tissue, table):
         part.close()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:

@@ -102,13 +102,13 @@ def motor(joint: int) -> tuple[Physical, ...]:
 
 def part(name: str) -> Physical:
     """A mass of a link such as m3, the distance lc3 of its centre from its frame's origin, or a moment such as Iy3."""
-    kind, about, link = re.fullmatch("(m|lc|I)([xyz]?)(.+)", name).groups()  # type: ignore[union-attr]
+    kind, letter, link = re.fullmatch("(m|lc|I)([xyz]?)(.+)", name).groups()  # type: ignore[union-attr]
     i = CHAIN.links.index(link)
     if kind == "m":
         return Physical(name, Quality.MASS, float(GUESSED.masses[i]), *BOX[Quality.MASS], link)
     if kind == "I":
-        guess, axis = float(GUESSED.inertias[i, AXIS_INDEX[about], AXIS_INDEX[about]]), AXIS_INDEX[about]
-        return Physical(name, Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis)
+        axis = AXIS_INDEX[letter]
+        return Physical(name, Quality.MOMENT, float(GUESSED.inertias[i, axis, axis]), *BOX[Quality.MOMENT], link, axis)
     axis = int(np.abs(GUESSED.centres[i]).argmax())
     return Physical(name, Quality.CENTRE, float(-GUESSED.centres[i, axis]), *BOX[Quality.CENTRE], link, axis)
 

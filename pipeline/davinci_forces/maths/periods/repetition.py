@@ -100,8 +100,8 @@ def _shortest(lags: list[int], x: Array) -> float:
     steps = [max(1, lag // LAG_PARTS) for lag in lags]
     least = [vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
     bound = MAX_RATIO_PERIOD * least[-1][1] + ROUNDED
-    found = zip(lags, steps, least, strict=True)
-    return next(lag + step * shift for lag, step, (shift, value) in found if value <= bound)
+    candidates = zip(lags, steps, least, strict=True)
+    return next(lag + step * shift for lag, step, (shift, value) in candidates if value <= bound)
 
 
 def _apart(x: Array, lag: int) -> float:

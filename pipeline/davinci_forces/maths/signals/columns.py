@@ -147,9 +147,9 @@ class Outline:
             self._bins = np.add.reduceat(bins, np.arange(0, bins.shape[1], 2), axis=1) if bins.size else bins
             self.bin_size *= 2
         number, needed = np.arange(self.samples, end) // self.bin_size, -(-end // self.bin_size)
-        added = np.array([np.bincount(number, x, needed) for x in (np.where(finite, values, 0.0), finite)], float)
-        added[:, : self._bins.shape[1]] += self._bins
-        self._bins, self.samples = added, end
+        bins = np.array([np.bincount(number, x, needed) for x in (np.where(finite, values, 0.0), finite)], float)
+        bins[:, : self._bins.shape[1]] += self._bins
+        self._bins, self.samples = bins, end
 
     @property
     def mean(self) -> float:

@@ -140,8 +140,8 @@ def _standard_errors(
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
-    of_joint = joint.limits.q, joint.limits.dq, joint.limits.ddq
-    options = zip(("--q", "--dq", "--ddq"), request.limits, of_joint, strict=True)
+    joint_limits = joint.limits.q, joint.limits.dq, joint.limits.ddq
+    options = zip(("--q", "--dq", "--ddq"), request.limits, joint_limits, strict=True)
     q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
     missing = [name for name, pair in (("q", q), ("dq", dq)) if not all(map(math.isfinite, pair))]
     if joint.kind is Kind.REVOLUTE and not any(map(math.isfinite, q)):
@@ -161,10 +161,10 @@ def _excitation(
 ) -> ExcitationTrajectory:
     if request.evaluate is None:
         try:
-            found = design(problem, request.starts or STARTS, request.seed, report_start)
+            best = design(problem, request.starts or STARTS, request.seed, report_start)
         except ValueError as error:
             raise BadRequest(f"{joint.name}: {error}") from None
-        return ExcitationTrajectory(joint, problem, found.series, tuple(found.optima.tolist()), noise)
+        return ExcitationTrajectory(joint, problem, best.series, tuple(best.optima.tolist()), noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         names = ",".join(coefficient_names(2))
