@@ -218,13 +218,13 @@ def test_held_parameters_are_no_further_from_the_truth_than_free_ones():
 
 
 def test_what_the_solver_does_not_reach_is_refused_with_how_far_it_came(monkeypatch):
-    def hasty():
-        settings = careful()
+    def hasty(tolerance):
+        settings = careful(tolerance)
         settings.max_iter = 2
         return settings
 
-    careful = conic.careful_settings
-    monkeypatch.setattr(conic, "careful_settings", hasty)
+    careful = conic.settings
+    monkeypatch.setattr(conic, "settings", hasty)
     R, *_ = pose(impossible(), 1e-3)
     with pytest.raises(NotIdentifiable, match=r"the conic program was not solved \(MaxIterations after 2 steps\)"):
         nearest(R, ARM.mechanism)

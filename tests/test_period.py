@@ -11,7 +11,7 @@ from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.periods import period
 from davinci_forces.maths.periods.agreement import differing_periods, stretch
-from davinci_forces.maths.periods.repetition import _vertex, repetition
+from davinci_forces.maths.periods.repetition import repetition, vertex
 from davinci_forces.maths.periods.steps import REACH, steps
 from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
 from davinci_forces.stages.model import fit
@@ -369,11 +369,11 @@ def test_a_stretch_ends_to_the_sample_where_the_motion_is_a_hundredth_away(start
 @pytest.mark.parametrize("at", [-0.9, -0.2, 0.0, 0.4])
 def test_the_lowest_point_between_neighbours_is_that_of_the_parabola_through_them(at):
     y = [2.0 * (x - at) ** 2 + 0.5 for x in (-1.0, 0.0, 1.0)]
-    assert _vertex(*y) == (pytest.approx(at), pytest.approx(0.5))
+    assert vertex(*y) == (pytest.approx(at), pytest.approx(0.5))
 
 
 def test_the_lowest_point_is_no_further_than_the_neighbours_and_none_where_a_parabola_has_none():
-    shift, lowest = _vertex(4.0, 2.0, 0.5)  # the parabola is lowest at 3.5
+    shift, lowest = vertex(4.0, 2.0, 0.5)  # the parabola is lowest at 3.5
     assert (shift, lowest) == (1.0, pytest.approx(0.5))
-    assert _vertex(1.0, 2.0, 1.0) == (0.0, 2.0)
-    assert _vertex(2.0, 0.1, 0.2)[1] == 0.0  # a squared difference is not negative
+    assert vertex(1.0, 2.0, 1.0) == (0.0, 2.0)
+    assert vertex(2.0, 0.1, 0.2)[1] == 0.0  # a squared difference is not negative

@@ -40,8 +40,8 @@ def problems(averages: list[Average]) -> dict[str, Regression]:
     made = {}
     for mean in averages:
         joint = ROBOT.joint(mean.joint)
-        records = differentiate.run(mean, joint, harmonics=0)
-        made[joint.name] = pose(independent(joint), [r for r in records if isinstance(r, Trajectory)])
+        [trajectory] = (r for r in differentiate.run(mean, joint, harmonics=0) if isinstance(r, Trajectory))
+        made[joint.name] = pose(independent(joint), trajectory)
     return made
 
 

@@ -172,7 +172,7 @@ def test_noise_of_averaged_positions_comes_to_the_columns_as_is_said():
 
 def test_what_is_known_of_the_columns_goes_with_the_logs():
     model = independent(arm.joint("hand_roll"))
-    one, other = (pose(model, [trajectory(arm.signal(seed=seed, log=f"log-{seed}"))]) for seed in (0, 1))
+    one, other = (pose(model, trajectory(arm.signal(seed=seed, log=f"log-{seed}"))) for seed in (0, 1))
     both = join_regressions([one, other])
     assert_array_equal(both.Phi_cov, np.concatenate([one.Phi_cov, other.Phi_cov]))
     assert_array_equal(select_logs(both, [1]).Phi_cov, other.Phi_cov)

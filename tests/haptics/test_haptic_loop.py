@@ -27,7 +27,7 @@ def let_go(tick: float):
     """The hand let go 1 cm from a spring, its force continuous but for the ticks."""
     T = round(2.0 / tick)
     clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*zero_order_hold(THESIS_HAND, tick), NOBODY)
-    axis, tissue, noise = haptic._axis(IDEAL), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
+    axis, tissue, noise = haptic._axis(IDEAL, -0.01), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
     return simulate(grip, IDEAL.device, axis, tissue, clocks, np.zeros(T), noise, (-0.01, 0.0), lambda r: r.force)
 
 

@@ -14,7 +14,6 @@ from davinci_forces.maths.tissue.indentation import (
     onset_std,
     slope_error,
     straight,
-    work,
 )
 from davinci_forces.maths.tissue.palpation import between_troughs
 from davinci_forces.maths.tissue.tissue import LAWS, cross_validate_law, moments
@@ -272,7 +271,6 @@ def test_swings_are_told_by_their_troughs_and_numbers_by_their_runs():
     assert between_troughs(t) == [slice(0, 1000)]
     assert between_troughs(np.ones(7)) == [slice(0, 7)]
     assert list(segments(np.array([3, 3, 1, 1, 1, 3]))) == [slice(0, 2), slice(2, 5), slice(5, 6)]
-    assert work(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 2.0])) == 3.0
 
 
 def test_a_number_that_comes_twice_is_two_pushes():

@@ -32,6 +32,7 @@ class Prior(NamedTuple):
 
 
 NO_PRIOR = Prior()
+ROWS = ("Phi", "tau", "tau_var", "periods", "noise")  # fields of a regression with one entry a sample
 
 
 @dataclass(frozen=True, eq=False)

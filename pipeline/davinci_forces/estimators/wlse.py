@@ -68,33 +68,21 @@ def pool_variance(var: Array, M: NDArray[np.int64]) -> Array:
     Each sample is weighted by its degrees of freedom, M - 1 for M (K,) periods.  If periods do not differ at all, all
     samples get the same variance.
     """
-    K, lowest, highest = len(var), max(int(M.min()) - 1, 0), max(int(M.max()) - 1, 0)
-    if lowest == highest:
-        half = half_width(lowest, K)
-        smooth = window_sum(var, half)
-        smooth /= 2 * half + 1
+    from scipy.ndimage import uniform_filter1d
+
+    if not var.any():
+        return np.ones(len(var))
+    degrees = np.maximum(M[:1] if M.min() == M.max() else M, 1) - 1.0
+    half = min(int(np.ceil(DEGREES / max(float(np.median(degrees)), 1.0))) // 2, (len(var) - 1) // 2)
+    window = 2 * half + 1  # samples, at most a period, whose end is next to its beginning
+    if len(degrees) == 1:
+        smooth = uniform_filter1d(var, window, mode="wrap")
     else:
-        degrees = np.maximum(M - 1, 0).astype(float)
-        half = half_width(float(np.median(degrees)), K)
-        smooth = window_sum(var * degrees, half) / np.maximum(window_sum(degrees, half), 1.0)
-    return np.asarray(np.maximum(smooth, 1e-12 * var.mean(), out=smooth)) if var.any() else np.ones(K)
-
-
-def half_width(degrees: float, K: int) -> int:
-    """Return the half-width of the window that holds `DEGREES` degrees of freedom; at most the period."""
-    return min(int(np.ceil(DEGREES / max(degrees, 1.0))) // 2, (K - 1) // 2)
+        squares, freedom = (uniform_filter1d(x, window, mode="wrap") for x in (var * degrees, degrees))
+        smooth = squares / np.maximum(freedom, 1.0 / window)
+    return np.asarray(np.maximum(smooth, 1e-12 * var.mean(), out=smooth))
 
 
 def median_periods(M: NDArray[np.int64]) -> int:
     """Return the median number of periods (K,) over the samples with at least one."""
     return int(M[0]) if M.min() == M.max() else int(np.median(M[M > 0]))
-
-
-def window_sum(x: Array, half: int) -> Array:
-    """Sum each sample (K,) and its neighbours; the last sample is next to the first."""
-    K = len(x)
-    total = np.empty(K + 2 * half + 1)
-    total[0] = 0.0
-    total[1 : half + 1], total[half + 1 : half + 1 + K], total[half + 1 + K :] = x[K - half :], x, x[:half]
-    np.cumsum(total, out=total)
-    return np.asarray(total[2 * half + 1 :] - total[:K])

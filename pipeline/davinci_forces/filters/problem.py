@@ -68,7 +68,7 @@ def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, ini
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))
     coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))
-    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, initial_std)  # type: ignore[arg-type]
+    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, initial_std)
 
 
 class NoiseModel(NamedTuple):

@@ -17,10 +17,11 @@ from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
 from davinci_forces.haptics.maths.delay import Complex, harmonic, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, records
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.bias import Coefficients
-from davinci_forces.maths.simulation.step import Friction
+from davinci_forces.maths.simulation.actuators import Loops
+from davinci_forces.maths.simulation.step import Friction, at_rest
 from davinci_forces.maths.simulation.surroundings import Path
 from davinci_forces.records import HapticRun
 
@@ -129,7 +130,8 @@ def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, x_0: f
     tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
     grip = Grip(*zero_order_hold(hand, scenario.tick), path)
     estimate = filter_in_loop(scenario) if scenario.filtered else lambda reading: reading.force  # sensor at the tip
-    return simulate(grip, scenario.device, _axis(scenario), tissue, clocks, push, noise, (x_0, 0.0), estimate)
+    axis = _axis(scenario, scenario.device.motion * x_0)
+    return simulate(grip, scenario.device, axis, tissue, clocks, push, noise, (x_0, 0.0), estimate)
 
 
 def _turns(scenario: HapticScenario, ticks: int) -> int:
@@ -144,14 +146,17 @@ def _parts(scenario: HapticScenario) -> tuple[float, AxisNoise]:
     return scenario.stiffness, scenario.noise
 
 
-def _axis(scenario: HapticScenario) -> Axis:
-    """The prismatic joint."""
+def _axis(scenario: HapticScenario, q: float) -> Axis:
+    """The prismatic joint, at rest at q [m]."""
     body = scenario.body or SLIDE
-    values = (body.viscous, *body.coulomb, *body.static, *body[5:])
-    friction = Friction(*(np.array([float(x)]) for x in values))
+    friction = Friction(*(np.array([float(x)]) for x in (body.viscous, *body.coulomb, *body.static, *body[5:])))
+    parts = scenario.motor, scenario.law, friction, Loops(*np.zeros((len(Loops._fields), 1))), at_rest(np.array([q]))
+    motors, law, friction_of_body, loops, state = map(records, parts)
     low, high = (np.array([stop]) for stop in scenario.stops)
-    inertia, gravity = np.array([[body.inertia]]), np.array([body.gravity])
-    return Axis(inertia, gravity, friction, scenario.motor, scenario.law, (low, high), scenario.exact)
+    return Axis(
+        motors, law, friction_of_body, loops, state, np.zeros(1), np.ones(1, np.bool_), np.array([[body.inertia]]),
+        np.array([body.gravity]), (low, high), scenario.exact,
+    )  # fmt: skip
 
 
 def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]:

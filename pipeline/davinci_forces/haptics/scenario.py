@@ -120,8 +120,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     """Build the scenario of a file, with problems noted."""
     default = HapticScenario()
     link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
-    device = table.table("device")
-    filtered, q_tau, assumed_body = _filter(table.table("filter"))
+    device, loop_filter = table.table("device"), table.table("filter")
     scenario = HapticScenario(
         title=table.text("title", default.title),
         seed=table.whole("seed", default.seed),
@@ -144,9 +143,9 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         stops=read_stops(arm, default.stops),
         body=_body(arm.table("body")) if "body" in arm else None,
         noise=_noise(arm.table("noise")) if "noise" in arm else None,
-        assumed_body=assumed_body,
-        filtered=filtered,
-        q_tau=q_tau,
+        assumed_body=_body(loop_filter.table("body")) if "body" in loop_filter else None,
+        filtered=loop_filter.text("use", "ekf", ("ekf", "none")) == "ekf",
+        q_tau=loop_filter.number("q_tau", default.q_tau, low=0.0),
         stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
         damping=tissue.number("damping", default.damping, low=0.0),
         friction=tissue.number("friction", default.friction, low=0.0),
@@ -155,7 +154,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     if scenario.friction >= 1.0:
         problem = f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls"
         tissue.problem(problem, "friction")
-    for part in (device, link, arm, tissue, table):
+    for part in (device, link, arm, loop_filter, tissue, table):
         part.close()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:
@@ -232,15 +231,6 @@ def _noise(table: TomlTable) -> AxisNoise:
     noise = AxisNoise(*(table.number(key, above=0.0) for key in AxisNoise._fields))
     table.close()
     return noise
-
-
-def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
-    """Read whether a filter estimates the force, the random walk of the filter, and the body that it assumes."""
-    filtered = table.text("use", "ekf", ("ekf", "none")) == "ekf"
-    q_tau = table.number("q_tau", 0.0, low=0.0)
-    assumed_body = _body(table.table("body")) if "body" in table else None
-    table.close()
-    return filtered, q_tau, assumed_body
 
 
 def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:

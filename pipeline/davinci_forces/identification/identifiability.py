@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression
-from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import least_squares
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
@@ -116,8 +115,3 @@ def percent(share: float) -> str:
 def moving_with(joint: str, logs: Sequence[str], moves: Sequence[tuple[str, str]]) -> list[str]:
     """Return the other joints that move in these logs; `moves` has (log, joint) of every joint that moves."""
     return list(dict.fromkeys(name for log, name in moves if log in logs and name != joint))
-
-
-def correlation_entries(conditioning: least_squares.ColumnAnalysis) -> Array:
-    """Return the correlation matrix row by row (p^2,)."""
-    return np.asarray(conditioning.correlation.ravel())

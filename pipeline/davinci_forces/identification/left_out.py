@@ -78,7 +78,7 @@ def without_folds(
     """Return the samples of each fold of a log's whole periods, and the least squares problem of the other folds."""
     period = np.minimum(((part.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
     fold, measured = np.array(folds(average.periods))[period], part.filled == 0
-    problem, moving = pose(model, [average], prior), ~stands_still(average)
+    problem, moving = pose(model, average, prior), ~stands_still(average)
     samples = part.t[measured], part.tau[measured], average.period, len(average.t), fold[measured]
     others = [
         replace(problem, tau=effort.mean, tau_var=effort.var, periods=np.where(moving, effort.counts, 0))

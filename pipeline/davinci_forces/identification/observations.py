@@ -19,12 +19,12 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.memory import select_samples as first_samples
 from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.periods.agreement import repetitions
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
     PATH_BLOCKS,
     Equations,
     path_blocks,
-    repetitions,
     side_by_side,
     sum_equations,
 )
@@ -107,8 +107,12 @@ class Observed(NamedTuple):
         Phi = np.zeros((len(samples), len(columns), len(model.parameters)))
         for efforts_of_part, (rows, taken) in parts.items():
             Phi[:, list(efforts_of_part)] = rows[np.searchsorted(taken, samples)]
-        efforts_of = (smooth_effort(self.records[i], cutoff or self.processing[i].cutoff) for i in columns)
-        return Phi, np.stack([tau[samples] for tau in efforts_of], axis=1), samples
+        tau = np.empty(Phi.shape[:2])
+        for m, i in enumerate(columns):
+            record, passed = self.records[i], cutoff or self.processing[i].cutoff
+            smooth = lowpass_segments(record.tau, record.segment, record.rate, passed)
+            tau[:, m] = np.where(is_still(record), np.nan, smooth)[samples]
+        return Phi, tau, samples
 
     def _smooth_rows(
         self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoff: float, wanted: Booleans
@@ -154,11 +158,6 @@ def is_evaluated(record: Motion) -> Booleans:
 def is_still(record: Motion) -> Booleans:
     """Whether a joint stands still at each sample (N,), or the sample is only filled in: its effort is not used."""
     return ~is_evaluated(record) | bool(record.at_rest)
-
-
-def smooth_effort(record: Motion, cutoff: float) -> Array:
-    """Low-pass the effort (N,) of a joint at `cutoff` [Hz]; NaN where it is not used."""
-    return np.where(is_still(record), np.nan, lowpass_segments(record.tau, record.segment, record.rate, cutoff))
 
 
 def averaged_samples(t: Array, average: Average | Trajectory) -> Booleans:

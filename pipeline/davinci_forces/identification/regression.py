@@ -1,10 +1,12 @@
 """Records as motions and regressions: averaged periods for fits, and recordings for predictions."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
+from davinci_forces.estimators.problem import NO_PRIOR, ROWS, Prior, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion
@@ -16,22 +18,21 @@ from davinci_forces.records import JointModel, Motion, Trajectory
 from davinci_forces.robots.robot import Joint
 
 
-def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Prior = NO_PRIOR) -> Regression:
-    """Return the least squares problem of a joint: the averaged periods of all its logs, one after the other.  (6.37)
+def pose(model: IndependentJoint, t: Trajectory, known: Prior = NO_PRIOR) -> Regression:
+    """Return the least squares problem of a joint over the averaged period of a log.  (6.37)
 
     Samples at standstill have weight 0, because friction is undetermined at standstill.
     """
-    lengths = [len(t) for t in trajectories]
     return Regression(
-        Phi=np.vstack([model.regressor(averaged_motion(t)).Phi[:, 0] for t in trajectories]),
-        tau=np.concatenate([t.tau for t in trajectories]),
-        tau_var=np.concatenate([t.tau_var for t in trajectories]),
-        periods=np.concatenate([np.where(stands_still(t), 0, t.count) for t in trajectories]),
-        starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
+        Phi=model.regressor(averaged_motion(t)).Phi[:, 0],
+        tau=t.tau,
+        tau_var=t.tau_var,
+        periods=np.where(stands_still(t), 0, t.count),
+        starts=(0,),
         names=tuple(parameter.name for parameter in model.parameters),
         known=known,
-        noise=np.concatenate([t.tau_alternating for t in trajectories]),
-        Phi_cov=np.array([row_covariance(model, t) for t in trajectories]),
+        noise=t.tau_alternating,
+        Phi_cov=row_covariance(model, t)[None],
     )
 
 
@@ -52,21 +53,14 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
 
 
 def join_regressions(parts: Sequence[Regression]) -> Regression:
-    """Return the least squares problem of several parts together."""
+    """Return the least squares problem of several parts together; what is not known of one is not known of all."""
     ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
-    covariances = [p.Phi_cov for p in parts if p.Phi_cov is not None]
-    noises = [p.noise for p in parts if p.noise is not None]
-    return Regression(
-        Phi=np.concatenate([p.Phi for p in parts]),
-        tau=np.concatenate([p.tau for p in parts]),
-        tau_var=np.concatenate([p.tau_var for p in parts]),
-        periods=np.concatenate([p.periods for p in parts]),
-        starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
-        names=parts[0].names,
-        known=parts[0].known,
-        noise=np.concatenate(noises) if len(noises) == len(parts) else None,
-        Phi_cov=np.concatenate(covariances) if len(covariances) == len(parts) else None,
-    )
+    starts = tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts)
+    columns = {name: [getattr(p, name) for p in parts] for name in (*ROWS, "Phi_cov")}
+    joined: dict[str, Any] = {
+        name: None if any(x is None for x in xs) else np.concatenate(xs) for name, xs in columns.items()
+    }
+    return replace(parts[0], starts=starts, **joined)
 
 
 def averaged_motion(trajectory: Trajectory) -> ArmMotion:

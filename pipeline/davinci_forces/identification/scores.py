@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators.problem import Estimator, Regression
+from davinci_forces.estimators.problem import ROWS, Estimator, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passed, white_std
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, model_error, root_mean_square
@@ -37,16 +37,10 @@ def select_logs(problem: Regression, logs: Sequence[int]) -> Regression:
     ends = (*problem.starts[1:], len(problem.tau))
     parts = [np.arange(problem.starts[i], ends[i]) for i in logs]
     rows = np.concatenate(parts)
-    return replace(
-        problem,
-        Phi=problem.Phi[rows],
-        tau=problem.tau[rows],
-        tau_var=problem.tau_var[rows],
-        periods=problem.periods[rows],
-        starts=tuple(np.cumsum([0, *map(len, parts[:-1])]).tolist()),
-        noise=None if problem.noise is None else problem.noise[rows],
-        Phi_cov=None if problem.Phi_cov is None else problem.Phi_cov[list(logs)],
-    )
+    columns = {name: x[rows] for name in ROWS if (x := getattr(problem, name)) is not None}
+    if problem.Phi_cov is not None:
+        columns["Phi_cov"] = problem.Phi_cov[list(logs)]
+    return replace(problem, starts=tuple(np.cumsum([0, *map(len, parts[:-1])]).tolist()), **columns)
 
 
 class Scorer:
@@ -72,46 +66,28 @@ class Scorer:
         slow = self._smoothed(error)
         noise = white_std(error - slow, self.passed) if self.white is None else self.white
         error, slow = error[self.free], slow[self.free]
-        unexplained = float(np.linalg.norm(error)) / self.spread
         rmse, rmse_std = root_mean_square(error)
+        unexplained = float(np.linalg.norm(error)) / self.spread
         unexplained_std = unexplained * rmse_std / (rmse or 1.0)
-        relative, relative_std = root_mean_square(slow, self.smooth)
-        rival, rival_std = root_mean_square(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL])
-        effort_rms, effort_rms_std = self.effort
         ceiling = noise**2 / self.variance
-        beyond_noise, beyond_noise_std = model_error(slow, noise * np.sqrt(self.passed))
+        scores = {
+            "rmse": (rmse, rmse_std),
+            "nrmse": (rmse / self.range, rmse_std / self.range),
+            "r2": (1.0 - unexplained**2, 2.0 * unexplained * unexplained_std),  # for this effort's known variance
+            "fit_percent": (100.0 * (1.0 - unexplained), 100.0 * unexplained_std),
+            "r2_ceiling": (1.0 - ceiling, ceiling * float(np.sqrt(2.0 / len(error)))),  # the noise is white
+            "model_error": model_error(slow, noise * np.sqrt(self.passed)),
+            "mean_error": (float(np.mean(slow)), error_of_pooled_mean(slow)),
+            "effort_rms": self.effort,
+            "relative_error": root_mean_square(slow, self.smooth),
+            "relative_error_1111": root_mean_square(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL]),
+        }
         return Prediction(
-            log=self.motion.log,
-            joint=self.motion.joint,
-            model=model,
-            estimator=name,
-            role=role,
-            scheme=scheme,
-            path=path,
-            rmse=rmse,
-            rmse_std=rmse_std,
-            nrmse=rmse / self.range,
-            nrmse_std=rmse_std / self.range,
-            r2=1.0 - unexplained**2,
-            r2_std=2.0 * unexplained * unexplained_std,  # for this effort, whose variance is known
-            fit_percent=100.0 * (1.0 - unexplained),
-            fit_percent_std=100.0 * unexplained_std,
-            r2_ceiling=1.0 - ceiling,
-            r2_ceiling_std=ceiling * float(np.sqrt(2.0 / len(error))),  # the noise is white
-            model_error=beyond_noise,
-            model_error_std=beyond_noise_std,
-            mean_error=float(np.mean(slow)),
-            mean_error_std=error_of_pooled_mean(slow),
-            effort_rms=effort_rms,
-            effort_rms_std=effort_rms_std,
-            relative_error=relative,
-            relative_error_std=relative_std,
-            relative_error_1111=rival,
-            relative_error_1111_std=rival_std,
-            t=self.motion.t,
-            tau=self.motion.tau,
-            tau_hat=tau_hat,
-        )
+            log=self.motion.log, joint=self.motion.joint, model=model, estimator=name, role=role, scheme=scheme,
+            path=path, t=self.motion.t, tau=self.motion.tau, tau_hat=tau_hat,
+            **{score: value for score, (value, _) in scores.items()},
+            **{f"{score}_std": std for score, (_, std) in scores.items()},
+        )  # fmt: skip
 
     def _smoothed(self, x: Array) -> Array:
         return lowpass_segments(x, self.motion.segment, self.motion.rate, self.lowpass)

@@ -94,9 +94,9 @@ class JointSearch:
         self._libraries: dict[tuple[Processing, tuple[Term, ...]], Library] = {}
         self._steps: dict[tuple[Processing, tuple[Term, ...]], Step | None] = {}
 
-    def model(self, terms: Sequence[Term], name: str = CHOSEN) -> CoupledArm | IndependentJoint:
+    def model(self, terms: Sequence[Term]) -> CoupledArm | IndependentJoint:
         """Return the model with these added terms."""
-        return joint_model(self.robot, self.joint, self.structure, terms, name)
+        return joint_model(self.robot, self.joint, self.structure, terms)
 
     def library(self, processing: Processing, terms: tuple[Term, ...]) -> Library:
         """Return the equations of the model with these added terms."""
@@ -210,13 +210,11 @@ def sets_of_terms(joint: Joint, structure: str) -> Iterator[tuple[Term, ...]]:
         yield from [sine] if sine and joint.kind is Kind.REVOLUTE else []
 
 
-def joint_model(
-    robot: Robot, joint: str, structure: str, terms: Sequence[Term], name: str = CHOSEN
-) -> CoupledArm | IndependentJoint:
+def joint_model(robot: Robot, joint: str, structure: str, terms: Sequence[Term]) -> CoupledArm | IndependentJoint:
     """Return the model of a joint with added terms."""
     if structure == "independent":
-        return independent(robot.joint(joint), terms, name)
-    return coupled_joints(robot, [[j.name for j in robot.joints].index(joint)], {joint: terms}, name)
+        return independent(robot.joint(joint), terms, CHOSEN)
+    return coupled_joints(robot, [[j.name for j in robot.joints].index(joint)], {joint: terms}, CHOSEN)
 
 
 def neighbours(values: Sequence[float], value: float) -> Sequence[float]:

@@ -166,29 +166,19 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
     return np.asarray((elapsed / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
 
 
-def repetitions(t: Array, period: float) -> Integers:
-    """The period of each sample (N,), counted from 0; the last one need not be whole."""
-    return np.asarray(((t - t[0]) / period + 1e-9).astype(np.int64))
-
-
-def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
-    """Schemes (G, C) of the cells that each of G groups leaves out; a cell is a block of one log.
+def schemes_of(squares: Array, count: int) -> list[Booleans]:
+    """Schemes (G, C) of the cells that each of G refits leaves out; a cell is a block of one of `count` logs.
 
     The schemes leave out sixths of the path, its halves, and each of several logs: at most `MAX_GROUPS` groups in all.
+    Each refit needs data of every effort, of squares (C, m) in all cells.
     """
-    logs = np.unique(log)
+    log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
+    parts = min(MAX_GROUPS - PATH_BLOCKS - 2, count)
     sixths = block == np.arange(PATH_BLOCKS)[:, None]
     halves = block // (PATH_BLOCKS // 2) == np.arange(2)[:, None]
-    most = MAX_GROUPS - PATH_BLOCKS - 2
-    group = np.searchsorted(logs, log) * min(most, len(logs)) // len(logs)
-    by_log = group == np.arange(min(most, len(logs)))[:, None]
-    return (sixths, halves, by_log) if len(logs) > 1 else (sixths, halves)
-
-
-def schemes_of(squares: Array, count: int) -> list[Booleans]:
-    """Return the leave-out schemes in which each refit has data of every effort, of squares (C, m) in all cells."""
-    log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
-    return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
+    by_log = log * parts // count == np.arange(parts)[:, None]
+    schemes = [sixths, halves, by_log] if count > 1 else [sixths, halves]
+    return [groups for groups in schemes if all((squares[~group].sum(axis=0) > 0).all() for group in groups)]
 
 
 class CrossValidation(NamedTuple):

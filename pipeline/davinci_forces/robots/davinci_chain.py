@@ -7,6 +7,7 @@ the guesses in Tables 6.4-6.6.  The thesis does not print the bounds of its sear
 kind of parameter, contain all values that such a link or motor could have.
 """
 
+import re
 from math import pi
 
 import numpy as np
@@ -99,45 +100,26 @@ def motor(joint: int) -> tuple[Physical, ...]:
     return tuple(Physical(name, quality, float(x[joint]), *BOX[quality]) for name, quality, x in guesses)
 
 
-def masses(*links: str) -> tuple[Physical, ...]:
-    """The masses of links."""
-    rows = map(CHAIN.links.index, links)
-    guesses = zip(links, GUESSED.masses[list(rows)].tolist(), strict=True)
-    return tuple(Physical(f"m{link}", Quality.MASS, guess, *BOX[Quality.MASS], link) for link, guess in guesses)
+def part(name: str) -> Physical:
+    """A mass of a link such as m3, the distance lc3 of its centre from its frame's origin, or a moment such as Iy3."""
+    kind, letter, link = re.fullmatch("(m|lc|I)([xyz]?)(.+)", name).groups()  # type: ignore[union-attr]
+    i = CHAIN.links.index(link)
+    if kind == "m":
+        return Physical(name, Quality.MASS, float(GUESSED.masses[i]), *BOX[Quality.MASS], link)
+    if kind == "I":
+        axis = AXIS_INDEX[letter]
+        return Physical(name, Quality.MOMENT, float(GUESSED.inertias[i, axis, axis]), *BOX[Quality.MOMENT], link, axis)
+    axis = int(np.abs(GUESSED.centres[i]).argmax())
+    return Physical(name, Quality.CENTRE, float(-GUESSED.centres[i, axis]), *BOX[Quality.CENTRE], link, axis)
 
 
-def centres(*links: str) -> tuple[Physical, ...]:
-    """The distance of each link's centre of mass from the origin of its frame, along the axis of the centre."""
-    parameters = []
-    for link in links:
-        centre = GUESSED.centres[CHAIN.links.index(link)]
-        axis = int(np.abs(centre).argmax())
-        parameters.append(Physical(f"lc{link}", Quality.CENTRE, float(-centre[axis]), *BOX[Quality.CENTRE], link, axis))
-    return tuple(parameters)
-
-
-def moments(*names: str) -> tuple[Physical, ...]:
-    """Moments of inertia; each name is an axis and a link, such as "y3"."""
-    parameters = []
-    for name in names:
-        axis, link = AXIS_INDEX[name[0]], name[1:]
-        guess = float(GUESSED.inertias[CHAIN.links.index(link), axis, axis])
-        parameters.append(Physical(f"I{name}", Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis))
-    return tuple(parameters)
-
-
-def table(joint: int, *parameters: tuple[Physical, ...]) -> PhysicalTable:
-    """The physical parameters of one of the arm's three joints."""
-    return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *(x for part in parameters for x in part)))
+def table(joint: int, names: str) -> PhysicalTable:
+    """The physical parameters of one of the arm's three joints: those of its motor, and of links."""
+    return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *map(part, names.split())))
 
 
 # (6.7) omits links 6 to 9.
-ROLL_PARTS = table(0, masses("3", "4", "5"), centres("3", "5"), moments("y2", "y3", "x4", "x5"))
+ROLL_PARTS = table(0, "m3 m4 m5 lc3 lc5 Iy2 Iy3 Ix4 Ix5")
 # (6.10) omits Iz7, which only adds to Iy6.  The signs printed there do not matter: the chain determines them.
-PITCH_PARTS = table(
-    1,
-    masses("3", "4", "5", "6", "7", "8", "9L"),
-    centres("3", "5", "6", "7", "8", "9L"),
-    moments("z3", "y5", "y6", "y8", "y9L"),
-)
-SLIDE_PARTS = table(2, masses("6", "7", "8", "9L"))
+PITCH_PARTS = table(1, "m3 m4 m5 m6 m7 m8 m9L lc3 lc5 lc6 lc7 lc8 lc9L Iz3 Iy5 Iy6 Iy8 Iy9L")
+SLIDE_PARTS = table(2, "m6 m7 m8 m9L")

@@ -171,12 +171,6 @@ class Geometry(NamedTuple):
     wrist: tuple[str, ...] = ()
 
 
-class _Weight(NamedTuple):
-    mass: float
-    centre: tuple[float, ...]
-    inertia: tuple[float, ...]
-
-
 def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     """Read the chain that a robot's file describes, with problems noted; empty if it has no [[link]]."""
     entries = table.tables("link", most=MOST_JOINTS)
@@ -185,7 +179,7 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     convention = table.text("convention", "modified", tuple(CONVENTIONS))
     wrist = tuple(table.take("wrist", [], (list,), "a list of names", lambda names: all(type(x) is str for x in names)))
     kinds = {joint.name: joint.kind for joint in joints}
-    coordinates, rows, weights = [*kinds, *wrist], list[TableRow](), list[_Weight | None]()
+    coordinates, rows, weights = [*kinds, *wrist], list[TableRow](), list[tuple[float, ...]]()
     for entry in entries:
         rows.append(_row(entry, [*BASE_NAMES, *(row.name for row in rows)], coordinates, kinds))
         weights.append(_weight(entry, rows[-1]))
@@ -219,11 +213,11 @@ def _row(table: TomlTable, parents: list[str], coordinates: list[str], kinds: di
     return TableRow(name, BASE if on in BASE_NAMES else on, alpha, a, d, theta, coordinate, sign, slides)
 
 
-def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
-    """Read mass, centre and inertia of a link; None if the file does not state them."""
+def _weight(table: TomlTable, row: TableRow) -> tuple[float, ...]:
+    """Read mass, centre and inertia of a link, ten numbers; none if the file does not state them."""
     stated = [key in table for key in WEIGHT_KEYS]  # a list, not a generator, because every key must be looked up
     if not any(stated):
-        return None
+        return ()
     if row.coordinate == FIXED:
         table.problem("a link without moved_by has no mass; add it to the link that carries this one", "mass")
     mass = table.number("mass", low=0.0, expected="a number of kg")
@@ -231,7 +225,7 @@ def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
     inertia = table.numbers("inertia", [0.0] * 6, 6, "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
     if len(inertia) == 6 and np.linalg.eigvalsh(_tensor(inertia))[0] < 0:
         table.problem(f"inertia {excerpt(list(inertia))} has a negative principal moment, which no body has", "inertia")
-    return _Weight(mass, centre, inertia)
+    return (mass, *centre, *inertia)
 
 
 def _tensor(inertia: Sequence[float]) -> Array:
@@ -239,12 +233,8 @@ def _tensor(inertia: Sequence[float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _bodies(weights: Sequence[_Weight | None], chain: Chain) -> Bodies:
+def _bodies(weights: Sequence[tuple[float, ...]], chain: Chain) -> Bodies:
     """The bodies of the moving links, in the frames of the dynamics; links without a stated mass have mass 0."""
-    stated = [weight or _Weight(0.0, (0.0,) * 3, (0.0,) * 6) for weight in weights]
-    return Bodies(
-        np.array([weight.mass for weight in stated]),
-        np.array([weight.centre for weight in stated]),
-        np.array([_tensor(weight.inertia) for weight in stated]),
-        np.zeros(len(stated), np.int64),
-    ).in_frames(chain.of_links)
+    stated = np.array([weight or (0.0,) * 10 for weight in weights])
+    tensors = np.array([_tensor(inertia) for inertia in stated[:, 4:].tolist()])
+    return Bodies(stated[:, 0], stated[:, 1:4], tensors, np.zeros(len(stated), np.int64)).in_frames(chain.of_links)

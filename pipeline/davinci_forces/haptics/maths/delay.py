@@ -32,7 +32,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from davinci_forces.errors import BadRequest
@@ -128,11 +127,11 @@ def unit_circle_angles(hand: Hand, rate: float, samples: int) -> Array:
 
 def zero_order_hold(hand: Hand, duration: float) -> tuple[Array, Array]:
     """The free hand's transition (2, 2), and its response (2,) to 1 N, over a duration [s]."""
-    block = np.zeros((3, 3))
-    block[:2, :2] = mode(hand, 0.0)
-    block[1, 2] = 1.0 / hand.m
-    moved = np.asarray(expm(block * duration))
-    return moved[:2, :2], moved[:2, 2]
+    from scipy.signal import cont2discrete
+
+    continuous = mode(hand, 0.0), np.array([[0.0], [1.0 / hand.m]]), np.eye(2), np.zeros((2, 1))
+    Phi, Gamma, *_ = cont2discrete(continuous, duration)
+    return Phi, Gamma[:, 0]
 
 
 def harmonic(t: Array, x: Array, w: float) -> complex:

@@ -18,9 +18,6 @@ EXISTS = 1e-7  # least t of an existing function; above the solver's tolerance
 TOLERANCE = 1e-9
 ROOT_2 = float(np.sqrt(2.0))  # factor of the off-diagonal entry in the solver's form of a symmetric matrix
 LMI_HALVINGS = 24
-# Sparse rows of the columns p, r and t: rows 0-2 are P, 3-5 and 6-8 the two modes.
-ENTRY_ROWS = np.array([0, 2, 4, 5, 7, 8, 1, 3, 4, 5, 6, 7, 8, 0, 2, 3, 5, 6, 8])
-COLUMN_STARTS = np.array([0, 6, 13, 19])
 
 
 def cqlf_exists(hand: Hand, k_t: Array) -> Booleans:
@@ -42,16 +39,11 @@ def inequality(hand: Hand, k_t: float) -> tuple[csc_array, Array]:
     mean = hand.k + 0.5 * k_t
     beta = hand.b / float(np.sqrt(hand.m * mean))
     stiff, soft = (hand.k + k_t) / mean, hand.k / mean
-    p = [-1.0, 1.0]
-    r = [-ROOT_2]
-    t = [1.0, 1.0]
-    bound = [0.0, 0.0, 1.0]
+    rows, bound = [[-1.0, 0.0, 1.0], [0.0, -ROOT_2, 0.0], [1.0, 0.0, 1.0]], [0.0, 0.0, 1.0]  # of P
     for k in (stiff, soft):
-        p += [ROOT_2 * (1.0 + k) / beta, 2.0]
-        r += [-2.0 * k / beta, -ROOT_2, 2.0 / beta]
-        t += [1.0, 1.0]
+        rows += [[0.0, -2.0 * k / beta, 1.0], [ROOT_2 * (1.0 + k) / beta, -ROOT_2, 0.0], [2.0, 2.0 / beta, 1.0]]
         bound += [0.0, ROOT_2 * k / beta, 2.0]
-    return csc_array((np.array(p + r + t), ENTRY_ROWS, COLUMN_STARTS), shape=(9, 3)), np.array(bound)
+    return csc_array(np.array(rows)), np.array(bound)
 
 
 def lmi_limit(hand: Hand, high: float) -> float:

@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, records
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.compiled import compile_and_store, compile_function, inline
-from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Motors
+from davinci_forces.maths.simulation.actuators import Device
 from davinci_forces.maths.simulation.control import drive, follow, read
-from davinci_forces.maths.simulation.step import Friction, at_rest, middle, step
+from davinci_forces.maths.simulation.step import middle, step
 
 FRICTION_VELOCITY = 1e-3  # w [m/s]; at lower velocities the tissue's friction falls smoothly to 0
 
@@ -45,13 +45,20 @@ class FeltTissue(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """The prismatic joint: motor, controller, body and friction, as arrays of one joint."""
+    """The prismatic joint and its state, in few arrays, because each array takes time to compile and at each call.
 
+    The first five are records (1,) with the fields of `Motors`, `Cascade`, `Friction`, `Loops` and of `at_rest`.
+    """
+
+    motors: Any
+    law: Any
+    friction: Any
+    loops: Any
+    state: Any
+    tau: Array  # (1,) [N]
+    moving: Booleans  # (1,)
     inertia: Array  # (1, 1) [kg]
     gravity: Array  # (1,) [N]
-    friction: Friction
-    motors: Motors
-    law: Cascade
     stops: tuple[Array, Array]  # (1,) each [m], from the tissue's surface
     exact: bool  # whether it follows its reference without error, without motor and controller
 
@@ -88,44 +95,20 @@ class LoopRun(NamedTuple):
     estimates: Array  # [N]
 
 
-class _Axis(NamedTuple):
-    """The axis and its state, in few arrays, because each array of an argument takes time to compile and at each call.
-
-    The first five are records (1,) with the fields of the named tuples.
-    """
-
-    motors: Any
-    law: Any
-    friction: Any
-    loops: Any
-    state: Any
-    tau: Array  # (1,) [N]
-    moving: Booleans  # (1,)
-    inertia: Array  # as in `Axis`
-    gravity: Array
-    stops: tuple[Array, Array]
-    exact: bool
-
-
 def simulate(
     grip: Grip, device: Device, axis: Axis, tissue: FeltTissue, clocks: Clocks, push: Array, noise: Array,
     start: tuple[float, float], estimate: Callable[[SensorReading], float],
 ) -> LoopRun:  # fmt: skip
-    """Simulate the loop over the ticks of `push`, F_H (T,) [N]; the hand begins at `start`, and the arm at rest there.
+    """Simulate the loop over the ticks of `push`, F_H (T,) [N]; the hand begins at `start`, and the arm in its state.
 
     `noise` (K, 3) is the noise of position, velocity and effort.  `estimate` returns the force [N] for the readings of
     each period of the controller, in order.
     """
     T, turns = len(push), len(noise)
-    state, loops = at_rest(np.array([device.motion * start[0]])), Loops(*np.zeros((len(Loops._fields), 1)))
-    arm = _Axis(
-        records(axis.motors), records(axis.law), records(axis.friction), records(loops), records(state), np.zeros(1),
-        np.ones(1, np.bool_), axis.inertia, axis.gravity, axis.stops, axis.exact,
-    )  # fmt: skip
     hand, sent = np.array(start), np.zeros((-(-T // clocks.message) + 1, 3))
     readings, estimates, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
     for k in range(turns + 1):
-        _run_period(k, grip, device, arm, tissue, clocks, push, noise, hand, sent, estimates, readings, ticks)
+        _run_period(k, grip, device, axis, tissue, clocks, push, noise, hand, sent, estimates, readings, ticks)
         if k < turns:
             estimates[k] = estimate(SensorReading(*readings[k].tolist()))
     x, dx, q, true, felt = ticks.T

@@ -34,13 +34,14 @@ LENGTH = 0.1  # [m] size of the links of an arm for surgery, which compares mome
 
 
 def settings(tolerance: float) -> Any:
-    """Settings of Clarabel: silent, one thread, no presolve, and gaps and residuals of at most `tolerance`."""
+    """Settings of Clarabel: silent, one thread, careful steps, and gaps and residuals of at most `tolerance`."""
     import clarabel
 
     chosen = clarabel.DefaultSettings()
     chosen.verbose = False
     chosen.max_threads = 1
     chosen.presolve_enable = False
+    chosen.max_step_fraction = MAX_STEP_FRACTION
     chosen.tol_gap_abs = chosen.tol_gap_rel = chosen.tol_feas = tolerance
     return chosen
 
@@ -51,7 +52,6 @@ class ConsistentParameters(NamedTuple):
     theta: Array  # (p,)
     x: Array  # (n,)
     excess: float  # of the squared residuals over their minimum, as a share of the effort's square
-    gap: float  # bound of the distance to the optimum, as a share of the effort's square
 
 
 class Cones(NamedTuple):
@@ -74,13 +74,13 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
         If the solver does not converge.
     """
     if not mechanism.links and (R.theta[mechanism.positive] >= 0).all():
-        return ConsistentParameters(R.theta, R.theta, 0.0, 0.0)
+        return ConsistentParameters(R.theta, R.theta, 0.0)
     F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.min_squares))
     cones = scale_unknowns(F, mechanism)
-    z, gap = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
+    z = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
     x = np.asarray(cones.scale[:, cones.seen] @ z * size)
     theta = np.asarray(mechanism.matrix @ x)
-    return ConsistentParameters(theta, x, float(R.excess(theta)) / size**2, gap)
+    return ConsistentParameters(theta, x, float(R.excess(theta)) / size**2)
 
 
 def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:
@@ -129,8 +129,8 @@ def scales_of_entries(size: Array, least: float) -> Array:
     return np.array([T[i] * T[j] for i, j in ENTRIES])
 
 
-def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
-    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges; return z and the gap.
+def solve(F: csc_array, y: Array, cones: Cones) -> Array:
+    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
     for price in PRICES:
         z, gap, status = solve_at_price(F, y, cones, price)
         if gap <= MAX_GAP_SOLVER:
-            return z, gap
+            return z
     raise NotIdentifiable(
         f"the conic program was not solved ({status}): it may miss the optimum by {gap:.1e} of the effort's square"
     )
@@ -163,20 +163,13 @@ def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[
     kinds: list[Any] = [clarabel.ZeroConeT(p), *[clarabel.PSDTriangleConeT(4)] * cones.links]
     kinds += [clarabel.NonnegativeConeT(len(cones.positive))] if len(cones.positive) else []
     bound = np.r_[y, np.zeros(len(bounded))]
-    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful_settings()).solve()
+    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, settings(TOLERANCE)).solve()
     z = np.array(answer.x)[:n]
     z[bounded] = np.array(answer.s)[p:]  # the slack lies exactly in the cones
     values, multiplier = z[cones.positive], np.array(answer.z)[p + TEN * cones.links :]
     z[cones.positive] = np.where((values < AT_BOUND) & (values < multiplier), 0.0, values)  # one of the two is 0
     gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # the dual is a lower bound
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
-
-
-def careful_settings() -> Any:
-    """Settings of the solver with steps of at most `MAX_STEP_FRACTION`."""
-    cautious = settings(TOLERANCE)
-    cautious.max_step_fraction = MAX_STEP_FRACTION
-    return cautious
 
 
 def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | None) -> Array:
@@ -206,7 +199,7 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
     kinds = [clarabel.ZeroConeT(len(F)), *[clarabel.PSDTriangleConeT(4)] * L, signs]
     squares = diags_array(2.0 * (~links | (guess is not None)), format="csc")
     cost, right = trace * 1.0 if guess is None else -2.0 * z_guess, np.r_[theta / size, np.zeros(len(bounded))]
-    z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, careful_settings()).solve().x)
+    z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, settings(TOLERANCE)).solve().x)
     miss = float(np.abs(F @ z - theta).max() / np.abs(theta).max())
     if not miss < MAX_GAP_SOLVER:
         raise NotIdentifiable(f"no links were found that have these parameters: they miss them by {miss:.1e}")

@@ -15,7 +15,7 @@ import numpy as np
 
 COEFFICIENTS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")
 VISCOUS, COULOMB = COEFFICIENTS.index("dq"), COEFFICIENTS.index("sign(dq)")
-Coefficients = tuple[float, float, float, float, float, float, float]
+Coefficients = tuple[float, ...]
 
 
 def bias(c: Coefficients, q: Any, dq: Any, z: Any) -> tuple[Any, Any, Any]:

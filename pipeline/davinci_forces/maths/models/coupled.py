@@ -81,9 +81,8 @@ class CoupledArm:
         for row, joint, term, column in self._frictions():
             z, z_valid = friction_state(motion, joint, term)
             valid &= z_valid
-            _, _, _, _, viscous, coulomb, of_z = term.coefficients
-            dq = motion.dq[:, joint]
-            Phi[:, row, column] = viscous * dq + coulomb * np.sign(dq) + of_z * z
+            c, dq = term.coefficients, motion.dq[:, joint]
+            Phi[:, row, column] = c[VISCOUS] * dq + c[COULOMB] * np.sign(dq) + term.has_z * z
         return Regressor(Phi, valid)
 
     def inertia(self, theta: Array, q: Array) -> Array:
@@ -100,10 +99,6 @@ class CoupledArm:
             unit = still + np.eye(q.shape[1])[row]
             columns[:, :, j, : len(base)] = of_links(self.chain, self.rows, q, still, unit)[:, :, base] - gravity
         return columns
-
-    def bias(self, theta: Array, motion: ArmMotion) -> Array:
-        """The effort (N, m) of this motion at zero acceleration.  (4.38)"""
-        return efforts(self, theta, motion._replace(ddq=np.zeros_like(motion.ddq)))
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
         """For each row its inertia, viscous and Coulomb friction; all other effort is known from the motion."""

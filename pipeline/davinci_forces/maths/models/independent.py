@@ -82,24 +82,15 @@ class IndependentJoint:
             columns.append(np.stack([by_q + 0.0 * q, by_dq + 0.0 * q, term.a + 0.0 * q], axis=1))
         return np.stack(columns, axis=-1)
 
-    def inertia(self, theta: Array, q: Array) -> Array:
-        """M (N, 1, 1), the same at all positions.  (6.5)"""
-        return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
-
     def inertia_columns(self, q: Array) -> Array:
         """Derivatives (N, 1, 1, p) of M at q (N, 1) by the parameters."""
         return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
-
-    def bias(self, theta: Array, motion: ArmMotion) -> Array:
-        """V + F + G (N, 1)."""
-        still = motion._replace(ddq=np.zeros_like(motion.ddq))
-        return efforts(self, theta, still)
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
         """Terms of q, dq and ddq as inertia and coefficients; friction with a state z as known effort."""
         c = bias_coefficients(self.terms, theta)
         of_z = [theta_i * term.has_z for theta_i, term in zip(theta, self.terms, strict=True)]
-        known_effort = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
+        known_effort = efforts(self, np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
         return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known_effort),)
 
 
@@ -127,5 +118,4 @@ def inertia_of(terms: Sequence[Term], theta: Array) -> float:
 def bias_coefficients(terms: Sequence[Term], theta: Array) -> Coefficients:
     """Coefficients of b = sum_i theta_i b_i, for `bias`, without terms of z."""
     rows = np.array([term.coefficients if not term.has_z else np.zeros(7) for term in terms])
-    constant, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
-    return constant, sine, cosine, linear, viscous, coulomb, presliding
+    return tuple((np.asarray(theta) @ rows).tolist())

@@ -118,14 +118,6 @@ class Model(Protocol):
         """Phi with tau = Phi theta.  (6.38)"""
         ...
 
-    def inertia(self, theta: Array, q: Array) -> Array:
-        """M (N, m, m) at q (N, n), of the joints in `efforts`.  (6.5)"""
-        ...
-
-    def bias(self, theta: Array, motion: ArmMotion) -> Array:
-        """The effort (N, m) of this motion at zero acceleration.  (4.38)"""
-        ...
-
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
         """The dynamics of each joint in `efforts`, for a filter.  (7.15), (7.16)"""
         ...

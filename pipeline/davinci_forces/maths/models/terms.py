@@ -75,8 +75,7 @@ class Term:
     @property
     def coefficients(self) -> Coefficients:
         """The coefficients of b, for `bias`."""
-        constant, sine, cosine, linear, viscous, coulomb, presliding = (self.b.get(name, 0.0) for name in COEFFICIENTS)
-        return constant, sine, cosine, linear, viscous, coulomb, presliding
+        return tuple(self.b.get(name, 0.0) for name in COEFFICIENTS)
 
 
 inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0, positive=True)

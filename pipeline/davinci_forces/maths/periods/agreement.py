@@ -9,6 +9,7 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.periods.averaging import Phases, end, nearest, phases, whole_periods
 from davinci_forces.maths.periods.harmonics import Harmonics
 from davinci_forces.maths.periods.period import refine, standard_error
+from davinci_forces.maths.signals.windows import runs
 
 MIN_ODD_RATIO = 2.0  # of a difference to what noise explains: dropping a period costs more than a smaller one
 NEGLIGIBLE_DIFFERENCE = 1e-4  # share of a signal's standard deviation: encoder steps cause smaller ones
@@ -72,7 +73,7 @@ def multiple_of_period(t: Array, signals: Sequence[Array], length: float, rate: 
     A motion may nearly repeat within its period.  Then every k-th period agrees with the first, and the periods between
     do not.  The groups are compared by an analysis of variance.
     """
-    phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+    phased, number = Phases(t, length, phases(length, rate)), repetitions(t, length)
     residuals = [phased.move_to_phases(x)[1] for x in signals if among]
     for k in among:
         place = number % k * phased.K + phased.bins
@@ -95,7 +96,7 @@ def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) ->
     return is_unlikely(F, _lag_one(residual - means.ravel()[place]), freedom, degrees)
 
 
-def numbers(t: Array, length: float) -> Integers:
+def repetitions(t: Array, length: float) -> Integers:
     """Number of the period of each time (N,), 0 for the first time."""
     elapsed_periods: Array = (t - t[0]) / length + 1e-9
     return elapsed_periods.astype(np.int64)
@@ -150,7 +151,7 @@ class _Periods(NamedTuple):
 
     @classmethod
     def from_times(cls, t: Array, length: float, rate: float) -> "_Periods":
-        phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+        phased, number = Phases(t, length, phases(length, rate)), repetitions(t, length)
         first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
         M, K = len(first), phased.K
         place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t)))
@@ -248,6 +249,4 @@ def _strays(t: Array, signals: Sequence[Array], length: float, agreed: slice, wi
 
 def _ahead(strays: Booleans) -> int:
     """Number of samples before the first run of samples that stray."""
-    counts = np.convolve(strays, np.ones(IN_A_ROW, dtype=int), mode="valid") if len(strays) >= IN_A_ROW else strays
-    runs = np.flatnonzero(counts >= IN_A_ROW)
-    return int(runs[0]) if len(runs) else len(strays)
+    return next((run.start for run in runs(strays) if run.stop - run.start >= IN_A_ROW), len(strays))

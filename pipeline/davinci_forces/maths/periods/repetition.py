@@ -30,13 +30,6 @@ class Repetition(NamedTuple):
     best_start: int  # first sample of the two periods
 
 
-class Lag(NamedTuple):
-    """Difference (n - 2 lag + 1,) between the halves of each span of two lags, as a share of twice its variance."""
-
-    lag: int
-    difference: Array
-
-
 def repetition(signals: Sequence[Array]) -> Repetition | None:
     """Find the longest section of a recording in which all signals repeat together, or None.
 
@@ -82,19 +75,21 @@ def _search(x: Array) -> Repetition | None:
     factor = -(-x.shape[1] // POINTS)
     n = x.shape[1] // factor
     points = x[:, : n * factor].reshape(len(x), n, factor).mean(axis=2)
-    lags = {lag.lag: lag for lag in _lags(points)}
-    lows = {lag: _lowest(lags, lag) for lag in lags if _is_low(lags, lag)}
+    differences = dict(_differences(points))
+    least = {lag: float(difference.min()) for lag, difference in differences.items()}
+    around = {lag: (least.get(lag - 1, np.inf), value, least.get(lag + 1, np.inf)) for lag, value in least.items()}
+    lows = {lag: vertex(*near)[1] for lag, near in around.items() if near[1] == min(near) and near[1] <= 2 * DIP}
     best = min(lows.values(), default=np.inf)
     if best > DIP:
         return None
     good = [lag for lag, value in lows.items() if value <= MAX_RATIO_PERIOD * best + ROUNDED]
-    bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * _least(lags[lag]), MIN_BOUND_RUN) for lag in good}
-    runs = {lag: _longest(lags[lag], min(bound, DIP)) for lag, bound in bounds.items()}
+    bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * least[lag], MIN_BOUND_RUN) for lag in good}
+    runs = {lag: _longest(differences[lag], lag, min(bound, DIP)) for lag, bound in bounds.items()}
     longest = max(stop - start for start, stop in runs.values())
     if longest < MIN_RUN_SHARE * n:
         return None
     lag, (start, stop) = next((lag, run) for lag, run in runs.items() if run[1] - run[0] >= MIN_LENGTH_RATIO * longest)
-    core = start + int(lags[lag].difference[start : stop - 2 * lag + 1].argmin())
+    core = start + int(differences[lag][start : stop - 2 * lag + 1].argmin())
     exact = _shortest([low for low in lows if low <= lag], points[:, core : core + 2 * lag])
     end = x.shape[1] if stop == n else stop * factor
     return Repetition(exact * factor, start * factor, end, core * factor)
@@ -103,11 +98,10 @@ def _search(x: Array) -> Repetition | None:
 def _shortest(lags: list[int], x: Array) -> float:
     """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that lag."""
     steps = [max(1, lag // LAG_PARTS) for lag in lags]
-    least = [_vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
-    for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
-        if value <= MAX_RATIO_PERIOD * least[-1][1] + ROUNDED:
-            return lag + step * shift
-    raise AssertionError("the last lag is as good as itself")
+    least = [vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
+    bound = MAX_RATIO_PERIOD * least[-1][1] + ROUNDED
+    candidates = zip(lags, steps, least, strict=True)
+    return next(lag + step * shift for lag, step, (shift, value) in candidates if value <= bound)
 
 
 def _apart(x: Array, lag: int) -> float:
@@ -115,7 +109,7 @@ def _apart(x: Array, lag: int) -> float:
     return float(((x[:, lag:] - x[:, :-lag]) ** 2).mean() / (2 * x.var(axis=1).mean()))
 
 
-def _vertex(before: float, middle: float, after: float) -> tuple[float, float]:
+def vertex(before: float, middle: float, after: float) -> tuple[float, float]:
     """Lowest point of the parabola through three neighbours: its place relative to the middle one, and its value.
 
     The point lies no further than the neighbours, because noise would determine a point beyond them.
@@ -127,8 +121,11 @@ def _vertex(before: float, middle: float, after: float) -> tuple[float, float]:
     return shift, max(middle + 0.5 * shift * (after - before + curvature * shift), 0.0)
 
 
-def _lags(x: Array) -> Iterator[Lag]:
-    """Yield the differences of the signals (J, n) after each lag, the shortest lag first."""
+def _differences(x: Array) -> Iterator[tuple[int, Array]]:
+    """Yield the differences of the signals (J, n) after each lag, the shortest lag first.
+
+    Differences (n - 2 lag + 1,) are those between the halves of each span of two lags, over twice its variance.
+    """
     n = x.shape[1]
     moves = MIN_SPAN_VARIANCE * float(x.var(axis=1).sum())
     first, second = (np.concatenate([np.zeros((len(x), 1)), np.cumsum(p, axis=1)], axis=1) for p in (x, x * x))
@@ -140,29 +137,13 @@ def _lags(x: Array) -> Iterator[Lag]:
         mean = (first[:, span:] - first[:, :-span]) / span
         variance = (squares[span:] - squares[:-span]) / span - (mean * mean).sum(axis=0)
         difference = (sums[lag:] - sums[:-lag]) / lag
-        yield Lag(lag, np.where(variance > moves, difference / (2 * np.maximum(variance, moves)), np.inf))
+        yield lag, np.where(variance > moves, difference / (2 * np.maximum(variance, moves)), np.inf)
 
 
-def _longest(lag: Lag, most: float) -> tuple[int, int]:
+def _longest(difference: Array, lag: int, most: float) -> tuple[int, int]:
     """The longest run of spans that differ by at most `most`: from its first point to the end of its last span."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (lag.difference <= most).view(np.int8), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (difference <= most).view(np.int8), [0]])))
     if not len(edges):
         return 0, 0
     at = int((edges[1::2] - edges[::2]).argmax())
-    return int(edges[2 * at]), int(edges[2 * at + 1]) - 1 + 2 * lag.lag
-
-
-def _least(lag: Lag) -> float:
-    return float(lag.difference.min())
-
-
-def _is_low(lags: dict[int, Lag], lag: int) -> bool:
-    here = _least(lags[lag])
-    return here <= DIP * 2 and all(here <= _least(lags[near]) for near in (lag - 1, lag + 1) if near in lags)
-
-
-def _lowest(lags: dict[int, Lag], lag: int) -> float:
-    """Least difference of the halves of any span around a lag, interpolated between points."""
-    if lag - 1 not in lags or lag + 1 not in lags:
-        return _least(lags[lag])
-    return _vertex(*(_least(lags[near]) for near in (lag - 1, lag, lag + 1)))[1]
+    return int(edges[2 * at]), int(edges[2 * at + 1]) - 1 + 2 * lag

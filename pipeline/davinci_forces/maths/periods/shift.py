@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.periods.repetition import vertex
 
 MIN_OVERLAP = 0.8  # of two recordings that do not repeat: share of the shorter one that must lie within the other
 SAME_PATH = 0.95  # likeness above which two recordings follow the same path
@@ -24,7 +25,7 @@ def circular(q: Array, reference: Array) -> Shift:
     spectra = np.conj(np.fft.rfft(q / spread, axis=0)) * np.fft.rfft(reference / spread, axis=0)
     products = np.fft.irfft(spectra.sum(axis=1), len(q))
     best = int(products.argmax())
-    samples = best + _vertex(*(float(products[(best + d) % len(q)]) for d in (-1, 0, 1)))
+    samples = best + vertex(*(-float(products[(best + d) % len(q)]) for d in (-1, 0, 1)))[0]
     return Shift(samples, _apart(q, roll(reference, samples), spread))
 
 
@@ -59,12 +60,6 @@ def straight(q: Array, reference: Array) -> Shift:
 
 def _apart(q: Array, reference: Array, spread: Array) -> Array:
     return np.asarray(np.sqrt(np.mean((q - reference) ** 2, axis=0)) / spread)
-
-
-def _vertex(before: float, middle: float, after: float) -> float:
-    """Place of the vertex of the parabola through three neighbours, relative to the middle one."""
-    curvature = 2.0 * middle - before - after
-    return float(np.clip(0.5 * (after - before) / curvature, -0.5, 0.5)) if curvature > 0 else 0.0
 
 
 def likeness(t: Array, q: Array, period: Array, length: float) -> float:

@@ -107,8 +107,10 @@ def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tup
     inside[inside] = h[before[inside]] <= gap
     values = x[nearest]
     if inside.any():
-        i = before[inside]
-        m, step = _slopes(x, h, gap), h[i][:, None]
+        i, m, chords = before[inside], np.gradient(x, t, axis=0), np.diff(x, axis=0) / h[:, None]
+        gaps = np.flatnonzero(h > gap)  # beside a gap, the slope is that of the chord
+        m[gaps], m[gaps + 1] = chords[np.maximum(gaps - 1, 0)], chords[np.minimum(gaps + 1, len(h) - 1)]
+        step = h[i][:, None]
         s = (at[inside] - t[i])[:, None] / step
         # Hermite's cubic has given values and slopes at both ends.
         values[inside] = (
@@ -116,21 +118,6 @@ def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tup
             + s**2 * (3 - 2 * s) * x[i + 1] + s**2 * (s - 1) * step * m[i + 1]
         )  # fmt: skip
     return values, exact, inside
-
-
-def _slopes(x: Array, h: Array, gap: float) -> Array:
-    """Slopes (N, C) of the parabolas through each sample and its neighbours; next to a gap, that of the chord.
-
-    A parabola's slope is the mean of its two chords' slopes, each weighted by the other's step.
-    """
-    chords = np.diff(x, axis=0) / h[:, None]
-    near = h <= gap
-    step = np.zeros((2, len(x)))  # to the left and to the right neighbour; 0 without a neighbour
-    step[0, 1:], step[1, :-1] = np.where(near, h, 0.0), np.where(near, h, 0.0)
-    weight = np.where(step[::-1] > 0, step[::-1], 1.0) * (step > 0)
-    all_chords = np.zeros((2, *x.shape))
-    all_chords[0, 1:], all_chords[1, :-1] = chords, chords
-    return np.asarray((weight[:, :, None] * all_chords).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)[:, None])
 
 
 def longest_bridge(T_s: float) -> float:

@@ -68,10 +68,8 @@ def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, floa
     if len(steps) < 2 * SMOOTHED:
         return 0.0, 0.0
     x, y = (np.convolve(column, mean, "valid") for column in (steps, 0.5 * (dq[1:] + dq[:-1])))
-    x, y = x - x.mean(), y - y.mean()
-    if not (x @ x > 0 and y @ y > 0):
-        return 0.0, 0.0
-    return float(x @ y / np.sqrt((x @ x) * (y @ y))), float(np.sqrt((y @ y) / (x @ x)))
+    (xx, xy), (_, yy) = np.cov(x, y).tolist()
+    return (xy / math.sqrt(xx * yy), math.sqrt(yy / xx)) if xx * yy > 0.0 else (0.0, 0.0)
 
 
 def round_rate(rate: float) -> float:
@@ -134,8 +132,7 @@ class Outline:
     least: float = math.inf
     most: float = -math.inf
     bin_size: int = 1  # samples whose mean is one value of the course
-    _sums: Array = field(default_factory=lambda: np.zeros(0))  # sum of the finite samples in each bin
-    _counts: Array = field(default_factory=lambda: np.zeros(0))  # number of finite samples in each bin
+    _bins: Array = field(default_factory=lambda: np.zeros((2, 0)))  # sum and number of the finite samples in each
 
     def update(self, values: Array) -> None:
         """Add the next block (N,)."""
@@ -146,27 +143,21 @@ class Outline:
         self.finite += int(finite.sum())
         end = self.samples + len(values)
         while end > 2 * self.width * self.bin_size:  # join bins in pairs, which doubles their length
-            pairs = (self._sums, self._counts)
-            self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
+            bins = self._bins
+            self._bins = np.add.reduceat(bins, np.arange(0, bins.shape[1], 2), axis=1) if bins.size else bins
             self.bin_size *= 2
-        needed = -(-end // self.bin_size)
-        number = np.arange(self.samples, end) // self.bin_size
-        self._sums = _grown(self._sums, needed) + np.bincount(number, np.where(finite, values, 0.0), minlength=needed)
-        self._counts = _grown(self._counts, needed) + np.bincount(number, finite, minlength=needed)
-        self.samples = end
+        number, needed = np.arange(self.samples, end) // self.bin_size, -(-end // self.bin_size)
+        bins = np.array([np.bincount(number, x, needed) for x in (np.where(finite, values, 0.0), finite)], float)
+        bins[:, : self._bins.shape[1]] += self._bins
+        self._bins, self.samples = bins, end
 
     @property
     def mean(self) -> float:
         """Mean of the finite samples; NaN if there is none."""
-        return float(self._sums.sum()) / self.finite if self.finite else math.nan
+        return float(self._bins[0].sum()) / self.finite if self.finite else math.nan
 
     @property
     def course(self) -> Array:
         """Mean of each bin; NaN where it has no finite sample."""
-        means = np.full(len(self._sums), np.nan)
-        np.divide(self._sums, self._counts, out=means, where=self._counts > 0)
-        return means
-
-
-def _grown(values: Array, length: int) -> Array:
-    return np.concatenate([values, np.zeros(max(0, length - len(values)))])
+        sums, counts = self._bins
+        return np.asarray(np.divide(sums, counts, out=np.full(len(sums), np.nan), where=counts > 0))

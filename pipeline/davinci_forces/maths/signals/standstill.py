@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks
+from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import NORMAL_MAD, segments
 
 HOLD = 1.0  # [s] shortest standstill: longer than a motion takes to reverse
@@ -41,11 +41,10 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     if window > N:
         return np.zeros(N, np.bool_)
     centres = slice(window // 2, N - (window - 1) // 2)  # of windows within the segment
-    first = np.flatnonzero((maximum_filter1d(q, window) - minimum_filter1d(q, window))[centres] < least)
-    covers = np.zeros(N + 1, np.int64)
-    np.add.at(covers, np.maximum(first - spread, 0), 1)
-    np.add.at(covers, np.minimum(first + window + spread, N), -1)
-    return np.asarray(np.cumsum(covers[:-1]) > 0)
+    still = np.zeros(N, np.bool_)
+    still[centres] = (maximum_filter1d(q, window) - minimum_filter1d(q, window))[centres] < least
+    shift = window % 2 - 1  # an even window has one more sample before its centre than after it
+    return np.asarray(maximum_filter1d(still, window + 2 * spread, mode="constant", origin=shift))
 
 
 def without_doubtful_signs(dq: Array, standing: Booleans, q_std: float, dq_std: float) -> Array:
@@ -61,13 +60,11 @@ def without_doubtful_signs(dq: Array, standing: Booleans, q_std: float, dq_std: 
 
 def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:
     """Whether each sample of a velocity (N,), low-passed without delay, is far from reversals and standstills."""
+    from scipy.ndimage import maximum_filter1d
+
     rms_velocity = float(np.sqrt(np.mean(dq**2)))
     standing = np.abs(dq) <= SLOW * rms_velocity
     standing[1:] |= np.sign(dq[1:]) != np.sign(dq[:-1])
-    standing_before = np.cumsum(np.concatenate([[0], standing]))
-    far, N = np.empty(len(dq), np.bool_), len(dq)
-    for rows in row_blocks(N):
-        k = np.arange(rows.start, rows.stop)
-        first, last = np.maximum(k - round(AFTER / T_s), 0), np.minimum(k + round(BEFORE / T_s) + 1, N)
-        far[rows] = standing_before[last] == standing_before[first]
-    return far
+    before, after = round(BEFORE / T_s), round(AFTER / T_s)
+    size = before + after + 1
+    return np.asarray(~maximum_filter1d(standing, size, mode="constant", origin=after - size // 2))

@@ -24,13 +24,9 @@ def over_velocity(dq: Array, ddq: Array, signals: Array) -> VelocityMap:
     edges = float(np.abs(dq).max() or 1.0) * np.linspace(-1.0, 1.0, 2 * RANGES + 1)
     range_of_sample = np.clip(np.digitize(dq, edges) - 1, 0, 2 * RANGES - 1)
     gaining = dq * ddq > 0
-    rows = []
-    for number in range(2 * RANGES):
-        for gains in (True, False):
-            inside = (range_of_sample == number) & (gaining == gains)
-            if np.count_nonzero(inside) >= MIN_SAMPLES_RANGE:
-                rows.append((dq[inside].mean(), gains, signals[inside].mean(axis=0), signals[inside].std(axis=0)))
-    if not rows:
-        return VelocityMap(np.empty(0), np.empty(0, np.bool_), *(np.empty((0, signals.shape[1])) for _ in range(2)))
-    columns = (np.array(column) for column in zip(*rows, strict=True))
-    return VelocityMap(*columns)
+    groups = [(range_of_sample == n) & (gaining == way) for n in range(2 * RANGES) for way in (True, False)]
+    parts = [part for part in groups if np.count_nonzero(part) >= MIN_SAMPLES_RANGE]
+    shape = len(parts), signals.shape[1]
+    mean, std = (np.array([f(signals[part], axis=0) for part in parts]).reshape(shape) for f in (np.mean, np.std))
+    gains = np.array([gaining[part].all() for part in parts], np.bool_)
+    return VelocityMap(np.array([dq[part].mean() for part in parts]), gains, mean, std)

@@ -207,11 +207,6 @@ def slope_error(depth: Array, std: float) -> float:
     return std * float(np.sqrt(max(a @ np.exp(-apart / length) @ a for length in lengths)))
 
 
-def work(depth: Array, force: Array) -> float:
-    """The work [J] that a force (N,) does along depths (N,), in order of time: the integral of f over d."""
-    return float(np.sum(np.diff(depth) * (force[1:] + force[:-1]) / 2))
-
-
 def median_std(k: Array, random: Array, common: float, factor: float = np.pi / 2) -> float:
     """Standard error of the median of stiffnesses (n,), each with an error (n,), and a `common` error.
 

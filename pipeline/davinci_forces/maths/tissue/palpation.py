@@ -185,7 +185,8 @@ class PalpatedPush(NamedTuple):
         if not np.isfinite(self.k_unloading):
             return float("nan"), float("nan")
         force = self.force - self.force[inside].min()
-        into, out = (indentation.work(self.depth[part], force[part]) for part in (inside & loading, inside & ~loading))
+        ways = inside & loading, inside & ~loading
+        into, out = (float(np.trapezoid(force[way], self.depth[way])) for way in ways)
         return into + out, (into + out) / into if into > 0 else float("nan")
 
 

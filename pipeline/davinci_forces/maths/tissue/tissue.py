@@ -136,13 +136,12 @@ def _columns(x: Array, v: Array, exponents: Array) -> Array:
 def preferred_law(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
     """The model of the fewest parameters that predicts omitted pushes not clearly worse than the best one, and why."""
     best = min(candidates, key=lambda c: c.score)
-    for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):
-        worse = (candidate.errors - best.errors).tolist()
-        if candidate is best:
-            return best, "it predicts pushes left out best"
-        if float(np.mean(worse)) < error_of_mean(worse):
-            return candidate, f"{best.law.name} predicts pushes left out better, but by no more than chance does"
-    raise AssertionError("the best is one of the candidates")
+    worse = [c.errors - best.errors for c in candidates]
+    near = [c for c, x in zip(candidates, worse, strict=True) if c is best or x.mean() < error_of_mean(x)]
+    chosen = min(near, key=lambda c: (c.law.parameters, c.score))
+    if chosen is best:
+        return best, "it predicts pushes left out best"
+    return chosen, f"{best.law.name} predicts pushes left out better, but by no more than chance does"
 
 
 def _relative(pairs: list[tuple[float, float]]) -> float:

@@ -115,22 +115,11 @@ def students_95(degrees: int) -> float:
 
 
 def count_uncorrelated(x: Array) -> float:
-    """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero."""
-    centred = x - x.mean()
-    if len(x) > BLOCK_SAMPLES:
-        return _count_in_blocks(centred)
-    power = np.abs(np.fft.rfft(centred, 2 * len(x))) ** 2
-    covariance = np.fft.irfft(power)[: len(x)]
-    if covariance[0] <= 0.0:
-        return 1.0
-    until = int(np.argmax(covariance < 0.0)) or len(x)
-    return float(max(len(x) / (1.0 + 2.0 * np.sum(covariance[1:until]) / covariance[0]), 1.0))
+    """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero.
 
-
-def _count_in_blocks(centred: Array) -> float:
-    """`count_uncorrelated` of a long series: the autocovariance block by block, as far as its first zero."""
-    N, lags = len(centred), BLOCK_SAMPLES // 4
-    covariance = np.ones(1)
+    The autocovariance is computed block by block, and as far as its first zero, because a series may be long.
+    """
+    centred, N, lags, covariance = x - x.mean(), len(x), BLOCK_SAMPLES // 64, np.ones(1)
     while covariance.min() >= 0.0 and len(covariance) < N:
         lags, covariance = min(2 * lags, N), np.zeros(min(2 * lags, N))
         for start in range(0, N, lags):

@@ -18,7 +18,7 @@ from davinci_forces.maths.excitation.arm import (
     parameter_of,
 )
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
-from davinci_forces.maths.excitation.joint import ExcitationProblem
+from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.maths.excitation.limits import ArmLimits, Box, Obstacles
 from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.maths.models.coupled import LINK_UNITS
@@ -29,8 +29,6 @@ from davinci_forces.simulation.excitation.trajectory import (
     ExcitationTrajectory,
     ExpectedParameter,
     coefficient_names,
-    design_excitation,
-    problem_of,
 )
 from davinci_forces.toml import unlikely
 
@@ -142,8 +140,8 @@ def _standard_errors(
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
-    problem = problem_of(joint, period, request.harmonics, request.criterion, request.samples)
-    options = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
+    joint_limits = joint.limits.q, joint.limits.dq, joint.limits.ddq
+    options = zip(("--q", "--dq", "--ddq"), request.limits, joint_limits, strict=True)
     q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
     missing = [name for name, pair in (("q", q), ("dq", dq)) if not all(map(math.isfinite, pair))]
     if joint.kind is Kind.REVOLUTE and not any(map(math.isfinite, q)):
@@ -154,15 +152,19 @@ def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem
             f"{joint.name}: no limits of {' and '.join(missing)} are stated, so no motion can be known to be safe; add "
             f"limits to the joint in the robot's file, or give {remedy}, each as lower,upper"
         )
-    return replace(problem, limits=(q, dq, ddq))
+    harmonics = request.harmonics or joint.harmonics
+    return ExcitationProblem(joint.terms, (q, dq, ddq), period, harmonics, request.criterion, request.samples)
 
 
 def _excitation(
     request: Request, joint: Joint, problem: ExcitationProblem, noise: float, report_start: ReportStart | None
 ) -> ExcitationTrajectory:
     if request.evaluate is None:
-        designed = design_excitation(joint, problem, request.starts or STARTS, request.seed, report_start)
-        return replace(designed, noise=noise)
+        try:
+            best = design(problem, request.starts or STARTS, request.seed, report_start)
+        except ValueError as error:
+            raise BadRequest(f"{joint.name}: {error}") from None
+        return ExcitationTrajectory(joint, problem, best.series, tuple(best.optima.tolist()), noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         names = ",".join(coefficient_names(2))

@@ -12,9 +12,8 @@ import numpy as np
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation import fourier
-from davinci_forces.maths.excitation.joint import ExcitationProblem, design
+from davinci_forces.maths.excitation.joint import ExcitationProblem
 from davinci_forces.maths.excitation.limits import ArmLimits
-from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.robots.robot import Joint, Kind
 from davinci_forces.toml import unlikely
 
@@ -115,32 +114,6 @@ def finite(value: float) -> float | None:
 def coefficient_names(harmonics: int) -> list[str]:
     """The names of a series' coefficients: a0, a1, b1, a2, b2, ..."""
     return ["a0", *(f"{letter}{k}" for k in range(1, harmonics + 1) for letter in "ab")]
-
-
-def problem_of(
-    joint: Joint, period: float | None, harmonics: int | None, criterion: str, samples: int
-) -> ExcitationProblem:
-    """Build the excitation problem of a joint, with the joint's own limits."""
-    limits = (joint.limits.q, joint.limits.dq, joint.limits.ddq)
-    period = period or PERIODS[joint.kind]
-    return ExcitationProblem(joint.terms, limits, period, harmonics or joint.harmonics, criterion, samples)
-
-
-def design_excitation(
-    joint: Joint, problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
-) -> ExcitationTrajectory:
-    """Find the best trajectory of a joint.
-
-    Raises
-    ------
-    BadRequest
-        If the limits of the joint cannot be kept, or no trajectory separates its parameters.
-    """
-    try:
-        result = design(problem, starts, seed, report_start)
-        return ExcitationTrajectory(joint, problem, result.series, tuple(result.optima.tolist()))
-    except ValueError as error:
-        raise BadRequest(f"{joint.name}: {error}") from None
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:

@@ -12,7 +12,6 @@ from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regress
 from davinci_forces.identification.candidates import Library, variants, with_every_term
 from davinci_forces.identification.identifiability import (
     advice,
-    correlation_entries,
     describe_correlated,
     describe_insignificant,
     hardly_described,
@@ -27,7 +26,7 @@ from davinci_forces.identification.regression import join_regressions, known_of,
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import analyse_columns
-from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
@@ -135,7 +134,7 @@ def fit_joint(
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
-    yield from identifiability(model, parts, regression, estimates, robot, joint, others)
+    yield from identifiability(model, regression, estimates, robot, joint, others)
     yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
@@ -163,7 +162,6 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
 
 def identifiability(
     model: IndependentJoint,
-    parts: Sequence[Part],
     regression: Regression,
     estimates: dict[str, Estimate],
     robot: Robot,
@@ -186,9 +184,9 @@ def identifiability(
         advice=advice(robot, joint, (*pairs, *insignificant)),
         parameter=np.repeat(np.array(names, object), len(names)),
         beside=np.tile(np.array(names, object), len(names)),
-        correlation=correlation_entries(excitation),
+        correlation=excitation.correlation.ravel(),
     )
-    wrong = [name for name, estimate in estimates.items() if not has_positive_inertia(model, estimate.theta, parts)]
+    wrong = [name for name, estimate in estimates.items() if inertia_of(model.terms, estimate.theta) <= 0.0]
     if wrong:
         estimate = plain if "lse" in wrong else estimates[wrong[0]]
         verb = "estimates" if len(wrong) == 1 else "estimate"
@@ -233,7 +231,7 @@ def r_squared(regression: Regression, estimate: Estimate) -> float:
 def periodic_part(model: IndependentJoint, t: Trajectory, prior: Prior = NO_PRIOR) -> Part:
     """Regression over an averaged period; `prior` holds parameters from tables."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
-    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior), t)
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, t, prior), t)
 
 
 def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Prior) -> Part:
@@ -244,11 +242,6 @@ def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior:
     t, q, dq = (x[rows] for x in (record.t, record.q, record.dq))
     sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)
     return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression, log)
-
-
-def has_positive_inertia(model: IndependentJoint, theta: Array, parts: Sequence[Part]) -> bool:
-    """Whether M is positive definite along the trajectories; elsewhere the model has no forward dynamics."""
-    return all(np.linalg.eigvalsh(model.inertia(theta, part.q[:, None])).min() > 0 for part in parts)
 
 
 def fit_record(

@@ -10,16 +10,6 @@ from davinci_forces.filters.response import noise_model
 from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
-from davinci_forces.haptics.maths.bimodal import (
-    THESIS_HAND,
-    Law,
-    at_contact,
-    cqlf_limit,
-    energy,
-    simulate_switching,
-    switching_limit,
-    worst,
-)
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
@@ -54,7 +44,7 @@ def run(
     if not tissues:
         return
     yield stability_limit(robot)
-    for law in (worst, at_contact):
+    for law in (bimodal.worst, bimodal.at_contact):
         yield unstable_motion(robot, law)
     joint = next((joint for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort), None)
     bodies, arm_from = moving_bodies(robot, fits, joint)
@@ -79,19 +69,21 @@ def run(
 def stability_limit(robot: Robot) -> StabilityLimit:
     """The exact limits of tissue over hand stiffness, with a Lyapunov function and under arbitrary switching."""
     k_h = np.geomspace(bimodal.MIN_HAND_STIFFNESS, bimodal.MAX_HAND_STIFFNESS, 101)
-    hands = [THESIS_HAND._replace(k=k) for k in k_h.tolist()]
-    proved, switching = (np.array([limit(hand) for hand in hands]) for limit in (cqlf_limit, switching_limit))
-    return StabilityLimit(robot.name, THESIS_HAND.m, THESIS_HAND.b, k_h, proved, switching)
+    hands = [bimodal.THESIS_HAND._replace(k=k) for k in k_h.tolist()]
+    proved, switching = (
+        np.array([limit(hand) for hand in hands]) for limit in (bimodal.cqlf_limit, bimodal.switching_limit)
+    )
+    return StabilityLimit(robot.name, bimodal.THESIS_HAND.m, bimodal.THESIS_HAND.b, k_h, proved, switching)
 
 
-def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
+def unstable_motion(robot: Robot, law: bimodal.Law) -> HapticMotion:
     """The motion of a hand released at the tissue, with the worst or the actual switching.  Fig 8.8, 8.10"""
-    k_t = UNSTABLE_STIFFNESS * switching_limit(THESIS_HAND)
-    motion = simulate_switching(
-        THESIS_HAND, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / THESIS_HAND.frequency, law
+    k_t = UNSTABLE_STIFFNESS * bimodal.switching_limit(bimodal.THESIS_HAND)
+    motion = bimodal.simulate_switching(
+        bimodal.THESIS_HAND, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / bimodal.THESIS_HAND.frequency, law
     )
     name = law.__name__.replace("_", " ")
-    return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS_HAND, k_t, motion.x, motion.dx))
+    return HapticMotion(robot.name, name, k_t, *motion, bimodal.energy(bimodal.THESIS_HAND, k_t, motion.x, motion.dx))
 
 
 def filtered_recordings(

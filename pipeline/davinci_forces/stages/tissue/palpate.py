@@ -7,25 +7,8 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
 from davinci_forces.maths.signals.windows import unbroken
+from davinci_forces.maths.tissue import palpation, tissue
 from davinci_forces.maths.tissue.indentation import median_std
-from davinci_forces.maths.tissue.palpation import (
-    PalpatedPush,
-    Probing,
-    evaluate_pushes,
-    known_samples,
-    remarks,
-    touches_at_once,
-)
-from davinci_forces.maths.tissue.tissue import (
-    LAWS,
-    FittedLaw,
-    cross_validate_law,
-    force_of,
-    moments,
-    preferred_law,
-    standard_errors,
-    tangent,
-)
 from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
@@ -55,10 +38,10 @@ def run(
         yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {message}; {advice}")
         return
     whole, windows = entry.contact == WHOLE_LOG, () if entry.contact == WHOLE_LOG else entry.contact
-    pushes = evaluate_pushes(data, windows, whole, rate_of(data.t), lowpass)
+    pushes = palpation.evaluate_pushes(data, windows, whole, rate_of(data.t), lowpass)
     touched = [push for push in pushes if push.line is not None]
-    texts = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
-    if not entry.contact and data.push.any() and touches_at_once(numbered_pushes(data)):
+    texts = [f"{entry.name}: {remark}" for remark in palpation.remarks(pushes)]
+    if not entry.contact and data.push.any() and palpation.touches_at_once(numbered_pushes(data)):
         texts.append(
             f"{entry.name}: the force rises from the first sample of each push on, but its contact is searched, which "
             'changes the stiffness; write contact = "all" if the probe touches from the start, else contact windows'
@@ -75,7 +58,7 @@ def run(
         yield model_of(models, best, why, touched, entry.name, float(np.median(data.std)))
 
 
-def numbered_pushes(data: Probing) -> list[tuple[Column, Column]]:
+def numbered_pushes(data: palpation.Probing) -> list[tuple[Column, Column]]:
     """Depth and force (N,) of each push that the log numbers."""
     starts = np.flatnonzero(np.diff(data.push)) + 1
     way = np.linalg.norm(data.depth - data.depth[0], axis=1) if data.depth.shape[1] > 1 else data.depth[:, 0]
@@ -93,7 +76,7 @@ def has_force(touch: Touch) -> bool:
     return bool(np.isfinite(touch.force).any() or np.isfinite(touch.force_x).any())
 
 
-def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing | None:
+def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> palpation.Probing | None:
     """Force, depth and place of a log, from its own channels or, without such channels, from the prismatic joint."""
     if touch is not None and has_force(touch):
         is_scalar = np.isfinite(touch.force).any()
@@ -102,7 +85,9 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> P
         depth = depth_of(touch, slide, touch.t)
         if depth is None:
             return None
-        return known_samples(Probing(touch.t, touch.push, depth, force, place_of(touch), zeros + np.nan, zeros))
+        return palpation.known_samples(
+            palpation.Probing(touch.t, touch.push, depth, force, place_of(touch), zeros + np.nan, zeros)
+        )
     if slide is None:
         return None
     direct, dq = np.zeros(len(slide)), np.zeros(len(slide))
@@ -115,7 +100,9 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> P
     if touch is not None:
         nearest = np.clip(np.searchsorted(touch.t, slide.t), 0, len(touch) - 1)
         push, place = touch.push[nearest], place_of(touch)[nearest]
-    return known_samples(Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide)))
+    return palpation.known_samples(
+        palpation.Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide))
+    )
 
 
 def model_std(slide: Track) -> Column:
@@ -145,24 +132,26 @@ def rate_of(t: Column) -> float:
     return 1.0 / float(np.median(np.diff(t))) if np.isfinite(t).all() else 0.0
 
 
-def choose_law(pushes: Sequence[PalpatedPush], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
+def choose_law(
+    pushes: Sequence[palpation.PalpatedPush], *, clocked: bool
+) -> tuple[list[tissue.FittedLaw], tissue.FittedLaw | None, str]:
     """Score every tissue model on left-out pushes, and choose one model; this needs at least two pushes."""
     long = [push for push in pushes if push.contact.inside.sum() >= MIN_SAMPLES_PUSH]
     if len(long) < 2:
         return [], None, ""
     inside = [push.contact.inside for push in long]
-    sums = moments([(p.depth_in_contact[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
-    models = [cross_validate_law(sums, law) for law in LAWS if clocked or not law.has_damping]
-    return models, *preferred_law(models)
+    sums = tissue.moments([(p.depth_in_contact[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
+    models = [tissue.cross_validate_law(sums, law) for law in tissue.LAWS if clocked or not law.has_damping]
+    return models, *tissue.preferred_law(models)
 
 
-def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
+def record_of(push: palpation.PalpatedPush, log: str, best: tissue.FittedLaw | None) -> Push:
     """One push, with the force of the chosen model, or of the straight line if no model was chosen."""
     inside, line = push.contact.inside, push.line
     assert line is not None
     fitted = line.c + line.k * push.depth
     if best is not None:
-        fitted = force_of(best, push.depth_in_contact, push.rate)
+        fitted = tissue.force_of(best, push.depth_in_contact, push.rate)
         fitted = fitted + float(np.mean((push.force - fitted)[inside]))
     return Push.like(
         push,
@@ -186,7 +175,7 @@ def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
     )
 
 
-def stiffness_of(pushes: Sequence[PalpatedPush], log: str, source: str, swings: int) -> Stiffness:
+def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str, swings: int) -> Stiffness:
     """The stiffness of a log: the median slope of the pushes whose force is a straight line."""
     lines = [push.line for push in pushes if push.line is not None]
     k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
@@ -233,17 +222,17 @@ def stiffness_of(pushes: Sequence[PalpatedPush], log: str, source: str, swings: 
     )
 
 
-def onset_time_std(push: PalpatedPush) -> float:
+def onset_time_std(push: palpation.PalpatedPush) -> float:
     """Standard error of the time of first contact [s]: that of its depth over the rate of the depth there."""
     rate = abs(float(push.rate[int(np.argmax(push.contact.inside))]))
     return push.contact.onset_std / rate if rate > 0.0 else float("nan")
 
 
 def model_of(
-    models: Sequence[FittedLaw],
-    best: FittedLaw,
+    models: Sequence[tissue.FittedLaw],
+    best: tissue.FittedLaw,
     why: str,
-    pushes: Sequence[PalpatedPush],
+    pushes: Sequence[palpation.PalpatedPush],
     log: str,
     model_std: float,
 ) -> TissueModel:
@@ -252,8 +241,8 @@ def model_of(
     The force of a joint errs by `model_std`.  An error of friction reverses with the motion, as damping does.
     """
     middle = float(np.median([push.depth_in_contact[push.contact.inside].max() for push in pushes])) / 2
-    stiff, damping = np.array([tangent(model, middle) for model in models]).T
-    stiff_std, damping_std, exponent_std = np.array([standard_errors(model, middle) for model in models]).T
+    stiff, damping = np.array([tissue.tangent(model, middle) for model in models]).T
+    stiff_std, damping_std, exponent_std = np.array([tissue.standard_errors(model, middle) for model in models]).T
     speed = float(np.mean(np.abs(np.concatenate([push.rate[push.contact.inside] for push in pushes]))))
     if speed > 0.0:
         damping_std = np.where(damping != 0.0, np.hypot(damping_std, model_std / speed), damping_std)
