@@ -73,7 +73,7 @@ def rows_of(channels: int) -> int:
 
 
 def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: int) -> Iterator[Block]:
-    """Read the samples of channels of one group, equally many of each in every piece.
+    """Read the samples of channels of one group, which have equally many samples in every region.
 
     `origin` is the zero of time stamps, in seconds since 1904.
     """
@@ -89,22 +89,23 @@ def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], orig
 
 def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Read many complete records at a time."""
-    widest = max(column.count for column in columns.values())
-    many = max(1, min(BLOCK // region.stride, PIECE_ROWS // max(widest, 1)))
+    most = max(column.count for column in columns.values())
+    many = max(1, min(BLOCK // region.stride, PIECE_ROWS // most))
     begin = min(column.offset for column in columns.values())
-    needed = max(
-        column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
-    )
-    span = needed - begin
+    end = max(column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values())
+    span = end - begin
     apart = region.stride - span > MIN_SKIP
+    stride = span if apart else region.stride
     for first in range(0, region.records, many):
         records, start = min(many, region.records - first), region.position + first * region.stride + begin
         if apart:
             raw = b"".join(_read(file, start + i * region.stride, span) for i in range(records))
         else:
             raw = _read(file, start, (records - 1) * region.stride + span)
-        stride = span if apart else region.stride
-        yield {path: _view(raw, records, stride, column, begin) for path, column in columns.items()}
+        yield {
+            path: np.ndarray((records, c.count), c.dtype, raw, c.offset - begin, (stride, c.step))
+            for path, c in columns.items()
+        }
 
 
 def _read(file: BinaryIO, position: int, octets: int) -> bytes:
@@ -112,27 +113,17 @@ def _read(file: BinaryIO, position: int, octets: int) -> bytes:
     return file.read(octets)
 
 
-def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> NDArray[Any]:
-    shape = (records, column.count)
-    if not column.count:
-        return np.empty(shape, column.dtype)
-    return np.ndarray(shape, column.dtype, raw, offset=column.offset - begin, strides=(stride, column.step))
-
-
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Read records too large for memory: a slice of every channel at a time."""
-    most, rows = max(column.count for column in columns.values()), rows_of(len(columns))
+    count, rows = max(column.count for column in columns.values()), rows_of(len(columns))
     for record in range(region.records):
         start = region.position + record * region.stride
-        for first in range(0, most, rows):
-            yield {path: _slice(file, start, column, first, rows) for path, column in columns.items()}
-
-
-def _slice(file: BinaryIO, start: int, column: Column, first: int, rows: int) -> NDArray[Any]:
-    count = max(0, min(rows, column.count - first))
-    return np.frombuffer(
-        _read(file, start + column.offset + first * column.step, count * column.dtype.itemsize), column.dtype
-    )
+        for first in range(0, count, rows):
+            many = min(rows, count - first)
+            yield {
+                path: np.frombuffer(_read(file, start + c.offset + first * c.step, many * c.step), c.dtype)
+                for path, c in columns.items()
+            }
 
 
 def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
