@@ -62,13 +62,7 @@ def _source(study: Study) -> str:
 
 
 def expand_pattern(name: Path) -> list[Path]:
-    """The folders that a name with * or ? matches, as not every shell expands it; any other name is one folder.
-
-    Raises
-    ------
-    BadStudy
-        If there is no such folder.
-    """
+    """The folders that a name with * or ? matches, or that of any other name; raises BadStudy if none matches."""
     if name.exists() or not set("*?") & set(str(name)):
         return [name]
     folders = [Path(match) for match in sorted(glob(str(name))) if Path(match).is_dir()]
@@ -78,13 +72,7 @@ def expand_pattern(name: Path) -> list[Path]:
 
 
 def single_study(name: Path) -> Path:
-    """The folder of the one study that a name or pattern matches.
-
-    Raises
-    ------
-    BadStudy
-        If a pattern matches no folder, or several.
-    """
+    """The folder of the one study that a name or pattern matches; raises BadStudy if it matches none or several."""
     folders = expand_pattern(name)
     if len(folders) > 1:
         names = ", ".join(map(str, folders))

@@ -75,13 +75,7 @@ class Layout:
 
 
 def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
-    """Parse the header of a file, from its first line.
-
-    Raises
-    ------
-    BadHeader
-        If the separator is also the decimal mark, or X_Columns is none of No, One, Multi.
-    """
+    """Parse the header of a file, from its first line; raises BadHeader for an impossible mark or X_Columns."""
     separator = _separator(lines)
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
         raise BadHeader(
@@ -102,13 +96,7 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
 
 
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
-    """Parse the header of a file segment and its column line.
-
-    Raises
-    ------
-    BadHeader
-        If the column line is missing, or x is not time.
-    """
+    """Parse the header and the column line of a file segment; raises BadHeader without names, or if x is no time."""
     separator = file.separator.decode()
     tags = _tags(lines, separator, encoding)
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)

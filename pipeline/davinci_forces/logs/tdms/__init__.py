@@ -27,13 +27,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file, and read the metadata of its file segments.
-
-    Raises
-    ------
-    BadLog
-        If it holds no channel, or one with an unknown scale.
-    """
+    """Open the file, and read its metadata; raises BadLog if it holds no channel, or one with an unknown scale."""
     warnings: list[str] = []
     index, waveforms = Index(), Waveforms()
     with open_file(path) as file:
