@@ -110,19 +110,15 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
     start, started = _started(tags, file)
+    sampled = [i for i in measured if _cell(tags, "Samples", i) != "0"]  # without samples the other cells mean nothing
     written = _first(tags, "Delta_X")
     notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
     return Layout(
         file=file, names=tuple(names), units=tuple(units), line=line, samples=max(samples, default=None),
         start=start, started=started, x0=_number(_first(tags, "X0")) or 0.0, step=_number(written),
-        step_written=written, sampling={names[i]: _sampling(tags, i, start) for i in measured if _has_samples(tags, i)},
-        remarks=tuple(remarks), notes=notes,
+        step_written=written, sampling={names[i]: _sampling(tags, i, start) for i in sampled}, remarks=tuple(remarks),
+        notes=notes,
     )  # fmt: skip
-
-
-def _has_samples(tags: dict[str, list[str]], column: int) -> bool:
-    """Whether the header states samples of a column; without any, its other cells mean nothing."""
-    return _cell(tags, "Samples", column) != "0"
 
 
 def _sampling(tags: dict[str, list[str]], column: int, start: Decimal | None) -> Sampling:
