@@ -367,6 +367,16 @@ def test_without_flock_a_later_process_of_the_same_number_is_told_from_the_one_t
         assert [parse_holder(name).start for name in os.listdir(tmp_path / ".lock")] == [holder_now().start]
 
 
+def test_without_flock_a_run_whose_end_the_system_does_not_tell_is_refused_with_the_remedy(
+    tmp_path, without_flock, monkeypatch
+):
+    monkeypatch.setattr("davinci_forces.runner.lock.start_of", lambda process: "")
+    file = tmp_path / ".lock" / left_by(tmp_path).name
+    with pytest.raises(BadRequest) as refused, hold_lock(tmp_path):
+        pass
+    assert str(refused.value).endswith(f"if it has ended, delete {file}")
+
+
 @pytest.mark.parametrize("host", ["elsewhere.0", f"{socket.gethostname()}.0"], ids=["host", "container"])
 @pytest.mark.parametrize("as_file", [False, True])
 def test_without_flock_the_lock_of_another_host_is_never_taken(tmp_path, without_flock, host, as_file):

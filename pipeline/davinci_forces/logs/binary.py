@@ -38,13 +38,7 @@ def dtype_of(text: str) -> np.dtype[np.generic] | None:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file, and check the layout that the study states against its size.
-
-    Raises
-    ------
-    BadLog
-        If the study does not state the layout, or the file cannot have it.
-    """
+    """Open the file; raises BadLog if the study does not state its layout, or the file cannot have it."""
     dtype = dtype_of(options.dtype or "")
     if dtype is None or not options.columns:
         raise BadLog(

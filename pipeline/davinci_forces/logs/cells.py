@@ -134,13 +134,7 @@ def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[in
 
 
 def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int]) -> Cells:
-    """Parse like `parse_either`, allow blanks around numbers, and locate a cell that is not a number.
-
-    Raises
-    ------
-    NotANumber
-        If a wanted cell is not a number.
-    """
+    """Parse like `parse_either`, allow blanks around numbers; raises NotANumber at a wanted cell that is none."""
     try:
         return parse_either(block, width, delimiter, wanted)
     except UNREADABLE:

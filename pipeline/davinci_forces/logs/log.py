@@ -90,9 +90,6 @@ class Log:
     dropped: int = 0  # unusable rows
     cut: bool = False  # the file is truncated, so channels may end in missing samples
     lent: dict[str, str] = field(default_factory=dict)  # by channel without a clock, the one whose clock it is given
-    _lookup: tuple[tuple[Channel, ...], dict[str, tuple[Channel, str]]] | None = field(
-        default=None, init=False, repr=False
-    )
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
@@ -160,20 +157,16 @@ class Log:
 
     def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
         """Group names of channels by their clock: its time channel, or "" for the clock of the log."""
+        clocks = {channel.time for channel in self.channels}
         grouped: dict[str, list[str]] = {}
-        for name in names:
-            full = name if name in self._looked_up else self.find(name).name
-            grouped.setdefault(self._looked_up[full][1], []).append(name)
+        for name, channel in zip(names, self._find_all(names), strict=True):
+            grouped.setdefault(channel.name if channel.name in clocks else channel.time, []).append(name)
         return grouped
 
-    @property
-    def _looked_up(self) -> dict[str, tuple[Channel, str]]:
-        """The channels and their clocks, by name; computed again when `channels` is replaced."""
-        if self._lookup is None or self._lookup[0] is not self.channels:
-            clocks = {channel.time for channel in self.channels} - {""}
-            by_name = {c.name: (c, c.name if c.name in clocks else c.time) for c in self.channels}
-            self._lookup = self.channels, by_name
-        return self._lookup[1]
+    def _find_all(self, names: Sequence[str]) -> list[Channel]:
+        """Find many channels; a search for each would take the square of the time."""
+        by_name = {channel.name: channel for channel in self.channels}
+        return [by_name.get(name) or self.find(name) for name in names]
 
     def _numbered(self, number: int) -> Channel:
         written = [channel for channel in self.channels if not channel.derived]
@@ -187,8 +180,7 @@ class Log:
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
-        for name in names:
-            channel = self._looked_up[name][0] if name in self._looked_up else self.find(name)
+        for name, channel in zip(names, self._find_all(names), strict=True):
             if channel.kind not in SAMPLED_KINDS:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
         if len(clocks := self.by_clock(names)) > 1:

@@ -6,8 +6,8 @@ They are read piece by piece, without pickle.
 import math
 import zipfile
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -91,29 +91,31 @@ class Member:
     dtype: np.dtype[Any]
     by_column: bool  # stored column after column
     of_record: str = ""
-    opened: list[Any] = field(default_factory=list)  # the file, the type of its elements, and where they begin
-    whole: list[Any] = field(default_factory=list)  # all samples, once they had to be read
 
     def __getitem__(self, part: tuple[Any, ...]) -> Array:
         """Read a part of it; columns are read as a whole."""
         if self.by_column or not (part and isinstance(part[0], slice) and part[0].stop is not None):
-            self.whole = self.whole or [self._samples(0, self.shape[0] if self.shape else 1)]
-            return np.asarray(self.whole[0][part])
+            return np.asarray(self._whole[part])
         first, last, _ = part[0].indices(self.shape[0])
         return np.asarray(self._samples(first, last)[(slice(None), *part[1:])])
 
-    def _samples(self, first: int, last: int) -> Any:
-        if not self.opened:
-            file = _opened(self.path, self.name)
-            self.opened += [file, _header(file)[2], file.tell()]
-        file, stored, begin = self.opened
+    @cached_property
+    def _whole(self) -> Array:
+        return self._samples(0, self.shape[0] if self.shape else 1)
+
+    @cached_property
+    def _opened(self) -> tuple[IO[bytes], np.dtype[Any], int]:
+        """The file, the type of its elements, and where they begin."""
+        file = _opened(self.path, self.name)
+        return file, _header(file)[2], file.tell()
+
+    def _samples(self, first: int, last: int) -> Array:
+        file, stored, begin = self._opened
         width = math.prod(self.shape[1:]) * stored.itemsize
         file.seek(begin + first * width)
         content = file.read(count := (last - first) * width)
         if len(content) < count:
             raise ValueError(f"an array ends after {len(content)} of {count} bytes")
-        values = np.frombuffer(content, stored)
-        values = values.reshape(
-            (last - first, *self.shape[1:])[: len(self.shape)], order="F" if self.by_column else "C"
-        )
+        shape = (last - first, *self.shape[1:])[: len(self.shape)]
+        values = np.frombuffer(content, stored).reshape(shape, order="F" if self.by_column else "C")
         return values[self.of_record] if self.of_record else values

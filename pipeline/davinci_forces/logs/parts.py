@@ -108,13 +108,7 @@ class Parts(Log):
         return twin
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the parts in order and collect their warnings, comments and counts.
-
-        Raises
-        ------
-        BadLog
-            If a part begins before its predecessor has ended.
-        """
+        """Read the parts in order, with their warnings, comments and counts; raises BadLog if two overlap."""
         self.warnings[:] = self.remarks
         time = next((time for time in names if time in self.times), "")
         axis = _Axis(self.parts, self.starts)

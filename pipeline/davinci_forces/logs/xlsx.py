@@ -32,13 +32,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def open_in_child(path: Path, options: Options) -> Log:
-    """Open the workbook; the sheet with the most rows is the log.
-
-    Raises
-    ------
-    BadLog
-        If no sheet holds columns of numbers, or its names are missing.
-    """
+    """Open the longest sheet of a workbook; raises BadLog if none has columns of numbers below their names."""
     with zipfile.ZipFile(path) as archive:
         size = sum(info.file_size for info in archive.infolist())
     if size > MAX_UNPACKED:

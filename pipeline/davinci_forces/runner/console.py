@@ -25,6 +25,7 @@ class Console:
     say: Callable[..., None]  # a line and its style
     warn: Callable[[str], None]
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None
+    is_verbose: bool = False  # also print the time of each task as it ends
 
 
 def console(verbosity: Verbosity) -> Console:
@@ -38,7 +39,7 @@ def console(verbosity: Verbosity) -> Console:
     def warn(line: str) -> None:
         echo(line, err=True, fg="yellow")
 
-    return Console(say, warn, bar.show) if bar else Console(say, warn)
+    return Console(say, warn, bar.show) if bar else Console(say, warn, is_verbose=verbosity == "verbose")
 
 
 class Bar:

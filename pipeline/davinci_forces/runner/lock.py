@@ -53,7 +53,8 @@ class Holder:
             )
         start = start_of(int(self.process))
         if start is not None and (start == self.start or "" in (start, self.start)):
-            raise BadRequest(f"{folder}: {BUSY}: {text}; {REMEDY}")
+            ended = "" if start else f"; if it has ended, delete {file}"
+            raise BadRequest(f"{folder}: {BUSY}: {text}; {REMEDY}{ended}")
 
 
 def holder() -> Holder:
@@ -83,7 +84,7 @@ def this_host() -> str:
 def start_of(process: int) -> str | None:
     """The start time of a process; empty if the system does not provide it, `None` if the process has ended."""
     if sys.platform == "win32":
-        return _start_on_windows(process)
+        return ""
     try:
         os.getpgid(process)
         if sys.platform != "linux":
@@ -96,21 +97,6 @@ def start_of(process: int) -> str | None:
         return None
     except OSError:  # the process of another user may be hidden
         return ""
-
-
-def _start_on_windows(process: int) -> str | None:
-    import ctypes
-
-    kernel = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined,unused-ignore]
-    kernel.OpenProcess.restype = ctypes.c_void_p
-    handle = ctypes.c_void_p(kernel.OpenProcess(0x1000, False, process))  # PROCESS_QUERY_LIMITED_INFORMATION
-    if not handle:
-        return "" if ctypes.get_last_error() == 5 else None  # type: ignore[attr-defined,unused-ignore]  # access denied
-    code, times = ctypes.c_ulong(), [ctypes.c_uint64() for _ in range(4)]
-    kernel.GetExitCodeProcess(handle, ctypes.byref(code))
-    kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
-    kernel.CloseHandle(handle)
-    return str(times[0].value) if code.value == 259 else None  # STILL_ACTIVE
 
 
 @contextmanager

@@ -248,6 +248,8 @@ class Runner:
     def _record(self, outcome: Outcome) -> None:
         """Record the outcome of a task in the ledger, and print its messages."""
         task, stage = outcome.task, stage_of(outcome.task.step)
+        if self.console.is_verbose:
+            self.console.say(f"{stage}: {task.name}: took {outcome.seconds:.2f} s")
         fingerprint, environment = dict(vars(task.fingerprint)), reporting.environment()
         self.ledger.write(Entry(task.step, task.name, fingerprint, outcome.outputs, outcome.failed, environment))
         self.ran += 1

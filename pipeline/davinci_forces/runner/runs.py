@@ -9,11 +9,9 @@ from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.report import REPORT
 from davinci_forces.runner.console import Verbosity, console, durations, echo
-from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.processes.workers import WorkerPool, pool, prepare
 from davinci_forces.runner.runner import Runner
-from davinci_forces.runner.signature import stage_of
 from davinci_forces.study import Study, reading
 
 MAX_REPEATED = 10  # warnings that are printed once more at the end of a run
@@ -64,13 +62,7 @@ def _source(study: Study) -> str:
 
 
 def expand_pattern(name: Path) -> list[Path]:
-    """The folders that a name with * or ? matches, as not every shell expands it; any other name is one folder.
-
-    Raises
-    ------
-    BadStudy
-        If there is no such folder.
-    """
+    """The folders that a name with * or ? matches, or that of any other name; raises BadStudy if none matches."""
     if name.exists() or not set("*?") & set(str(name)):
         return [name]
     folders = [Path(match) for match in sorted(glob(str(name))) if Path(match).is_dir()]
@@ -80,13 +72,7 @@ def expand_pattern(name: Path) -> list[Path]:
 
 
 def single_study(name: Path) -> Path:
-    """The folder of the one study that a name or pattern matches.
-
-    Raises
-    ------
-    BadStudy
-        If a pattern matches no folder, or several.
-    """
+    """The folder of the one study that a name or pattern matches; raises BadStudy if it matches none or several."""
     folders = expand_pattern(name)
     if len(folders) > 1:
         names = ", ".join(map(str, folders))
@@ -151,9 +137,9 @@ def run(
     """Run stages of one study and the stages that they need, or preview the run; return whether all tasks succeeded."""
     study = load(folder)
     terminal = console(verbosity)
-    kind = VerboseRunner if verbosity == "verbose" else Runner
     places = folders(folder.resolve() if cluster else folder, processed, reports)
-    runner = kind(study, places, terminal, force, WorkerPool(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
+    others = WorkerPool(partial(pool, jobs), jobs, prepare) if jobs > 1 else None
+    runner = Runner(study, places, terminal, force, others)
     terminal.say(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
     if dry_run:
         for line in runner.preview(names):
@@ -195,11 +181,3 @@ def print_results(runner: Runner, folder: Path) -> None:
     for file in ("report.html", "report.pdf", "robot.html", "results.json"):
         if f"reports/{file}" in files:
             runner.console.say(f"{folder}: see {runner.folders.reports / file}")
-
-
-class VerboseRunner(Runner):
-    """A runner that also prints the time of each task as it ends."""
-
-    def _record(self, outcome: Outcome) -> None:
-        self.console.say(f"{stage_of(outcome.task.step)}: {outcome.task.name}: took {outcome.seconds:.2f} s")
-        super()._record(outcome)

@@ -217,13 +217,7 @@ def split_signal(file: Path) -> tuple[str, str]:
 
 
 def guess_joined(log: Joined) -> Holding:
-    """Guess the channels of joined files: joints in the order of columns, and a time that always increases.
-
-    Raises
-    ------
-    BadLog
-        Where a file is damaged.
-    """
+    """Guess the channels of joined files, joints in the order of columns; raises BadLog where one is damaged."""
     meanings: dict[str, Meaning] = {}
     samples = {}
     times = []

@@ -29,13 +29,7 @@ class Rating:
 
 
 def read(file: Path) -> tuple[Rating, ...]:
-    """Read the ratings of a file, in its order, and last its verdict on the study, if it has one.
-
-    Raises
-    ------
-    BadStudy
-        With every problem of the file, each with its line.
-    """
+    """Read the ratings of a file, and last its verdict on the study; raises BadStudy with the line of each problem."""
     table = toml.read(file, BadStudy)
     ratings = tuple(_rating(entry) for entry in table.tables("rating", most=MAX_TABLES))
     if "verdict" in table:

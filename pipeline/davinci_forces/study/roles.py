@@ -167,13 +167,10 @@ def _not_repeating(
     moved = {i: set(recordings[i].holding.moving) for i in late}
     spare = [i for i in late if moved[i] and moved[i] <= {*reach, *chain(*(moved[k] for k in late if k != i))}]
     if spare and not is_tested:
-        last = min(spare, key=lambda i: (_samples(recordings[i].holding), -i))
+        samples = {i: max((len(c.q) for c in recordings[i].holding.courses.values()), default=0) for i in spare}
+        last = min(spare, key=lambda i: (samples[i], -i))
         roles[last] = Role("validation", "the shortest motion of joints that other logs move: it tests the fit")
     return roles
-
-
-def _samples(holding: Holding) -> float:
-    return max((len(course.q) for course in holding.courses.values()), default=0)
 
 
 def _spans(holding: Holding) -> dict[int, float]:

@@ -53,13 +53,7 @@ class Child:
             )  # fmt: skip
 
     def answers(self, request: Message) -> Iterator[tuple[Message, list[Array]]]:
-        """Send a request and yield the answers, piece by piece.
-
-        Raises
-        ------
-        ChildEnded
-            If the child has ended, or was ended because an answer took longer than the request allows.
-        """
+        """Send a request, and yield the answers piece by piece; raises ChildEnded if the child ends, or is late."""
         assert self.process.stdin
         assert self.process.stdout
         more = True

@@ -25,13 +25,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file, and find all headers in it.
-
-    Raises
-    ------
-    BadLog
-        If a header is missing, has no end, or contradicts itself.
-    """
+    """Open the file, and find its headers; raises BadLog if one is missing, has no end, or contradicts itself."""
     lines, walk = Lines(path, options.encoding), Walk(options.encoding, lambda _: None)
     try:
         for block in lines.blocks():

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
+from functools import lru_cache
 
 from davinci_forces.logs.lines import decode
 from davinci_forces.logs.log import unique
@@ -48,7 +49,7 @@ class Layout:
     x0: float = 0.0
     step: float | None = None
     step_written: str = ""
-    sampled: tuple[Sampling | None, ...] = ()  # sampling of every measured column
+    sampling: dict[str, Sampling] = field(default_factory=dict)  # of the channels with samples
     remarks: tuple[str, ...] = ()  # what is wrong in the header, and what was done
     notes: str = ""
 
@@ -67,11 +68,6 @@ class Layout:
         """The sampling of the first channel as the header states it."""
         return self.sampling.get(self.first_channel) or Sampling(self.start, self.x0, self.step or 0.0)
 
-    @property
-    def sampling(self) -> dict[str, Sampling]:
-        """The sampling of each channel as the header states it."""
-        return {name: sampling for name, sampling in zip(self.names, self.sampled, strict=True) if sampling}
-
     def is_like(self, layout: "Layout") -> bool:
         """Whether the rows of both have the same columns."""
         mine, theirs = self.file, layout.file
@@ -79,13 +75,7 @@ class Layout:
 
 
 def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
-    """Parse the header of a file, from its first line.
-
-    Raises
-    ------
-    BadHeader
-        If the separator is also the decimal mark, or X_Columns is none of No, One, Multi.
-    """
+    """Parse the header of a file, from its first line; raises BadHeader for an impossible mark or X_Columns."""
     separator = _separator(lines)
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
         raise BadHeader(
@@ -106,13 +96,7 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
 
 
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
-    """Parse the header of a file segment and its column line.
-
-    Raises
-    ------
-    BadHeader
-        If the column line is missing, or x is not time.
-    """
+    """Parse the header and the column line of a file segment; raises BadHeader without names, or if x is no time."""
     separator = file.separator.decode()
     tags = _tags(lines, separator, encoding)
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)
@@ -126,33 +110,22 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
     start, started = _started(tags, file)
+    sampled = [i for i in measured if _cell(tags, "Samples", i) != "0"]  # without samples the other cells mean nothing
     written = _first(tags, "Delta_X")
     notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
     return Layout(
         file=file, names=tuple(names), units=tuple(units), line=line, samples=max(samples, default=None),
         start=start, started=started, x0=_number(_first(tags, "X0")) or 0.0, step=_number(written),
-        step_written=written, sampled=_sampled(tags, measured, len(names), start, file), remarks=tuple(remarks),
+        step_written=written, sampling={names[i]: _sampling(tags, i, start) for i in sampled}, remarks=tuple(remarks),
         notes=notes,
     )  # fmt: skip
 
 
-def _sampled(
-    tags: dict[str, list[str]], measured: Sequence[int], columns: int, start: Decimal | None, file: FileHeader
-) -> tuple[Sampling | None, ...]:
-    """Parse the sampling of each column; a missing cell has the value of the first one."""
-    starts = _starts(tags, columns, start)
-    x0, step = ([_cell(tags, tag, i) or _first(tags, tag) for i in range(columns)] for tag in ("X0", "Delta_X"))
-    sampled = (i for i in measured if _cell(tags, "Samples", i) != "0")  # without samples the other cells mean nothing
-    samplings = {i: Sampling(starts[i], _number(x0[i]) or 0.0, _number(step[i]) or 0.0) for i in sampled}
-    return tuple(samplings.get(i) for i in range(columns))
-
-
-def _starts(tags: dict[str, list[str]], columns: int, start: Decimal | None) -> list[Decimal | None]:
-    dates, times = tags.get("Date", []), tags.get("Time", [])
-    if len({*dates} - {""}) <= 1 and len({*times} - {""}) <= 1:
-        return [start] * columns
-    column_starts = (_start(_cell(tags, "Date", i), _cell(tags, "Time", i))[0] for i in range(columns))
-    return [start if column_start is None else column_start for column_start in column_starts]
+def _sampling(tags: dict[str, list[str]], column: int, start: Decimal | None) -> Sampling:
+    """Parse the sampling of a column; a missing cell has the value of the first one."""
+    own_start, _ = _start(_cell(tags, "Date", column), _cell(tags, "Time", column))
+    x0, step = (_number(_cell(tags, tag, column) or _first(tags, tag)) or 0.0 for tag in ("X0", "Delta_X"))
+    return Sampling(start if own_start is None else own_start, x0, step)
 
 
 def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
@@ -230,6 +203,7 @@ def _number(cell: str) -> float | None:
         return None
 
 
+@lru_cache  # all columns of a header have the same, as a rule
 def _start(date: str, time: str) -> tuple[Decimal | None, str]:
     """Parse a start to seconds since the year 1, exact to the last written digit, and to ISO 8601 without a zone."""
     day, clock = DATE_CELL.fullmatch(date), TIME_CELL.fullmatch(time)

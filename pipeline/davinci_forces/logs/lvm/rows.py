@@ -45,13 +45,7 @@ class Reading:
         self.marked = False
 
     def blocks(self) -> Iterator[Block]:
-        """The blocks of samples.
-
-        Raises
-        ------
-        BadLog
-            At a cell that is not a number, or a header that makes the file unreadable.
-        """
+        """Yield the blocks of samples; raises BadLog at a cell that is not a number, or an unreadable header."""
         try:
             for block in self.lines.blocks():
                 for run, cells in self.walk.runs(block, self._at_once):

@@ -128,13 +128,7 @@ class Walk:
             yield self._done.pop()
 
     def finish(self) -> None:
-        """Check that the file did not end within a header.
-
-        Raises
-        ------
-        BadHeader
-            If the file ended before any column line.
-        """
+        """Check that the file did not end within a header; raises BadHeader if it has no column line."""
         if self.state == "row" or (self.state == "between" and self.layout):
             return
         problem = {

@@ -44,13 +44,7 @@ class Objects:
         self.workspace, self.count = workspace, 0
 
     def read(self, reference: Any) -> list[MatlabObject]:
-        """Read the objects with these numbers.
-
-        Raises
-        ------
-        ValueError
-            If these are no numbers of objects, or there are more than `MAX_OBJECTS`.
-        """
+        """Read the objects with these numbers; raises ValueError if these are none, or beyond `MAX_OBJECTS`."""
         if not is_object(reference):
             raise ValueError("it does not refer to properties in this file")
         numbers = reference.ravel().tolist()

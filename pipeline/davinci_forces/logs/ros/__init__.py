@@ -16,13 +16,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the bag, and list its topics and the numbers in their messages.
-
-    Raises
-    ------
-    BadLog
-        If rosbags is not installed, or the bag cannot be read.
-    """
+    """Open the bag, and list its topics and their numbers; raises BadLog without rosbags, or at damage."""
     if path.is_file() and path.suffix == ".yaml":
         raise BadLog(f"{path}: this file describes a ROS 2 bag; name its folder instead, {path.parent}")
     return isolated.read(path, options, reader="davinci_forces.logs.ros.bag", package="rosbags", extra="ros")

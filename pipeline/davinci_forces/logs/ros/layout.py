@@ -90,13 +90,7 @@ def _view(place: Place, table: NDArray[np.uint8]) -> NDArray[Any]:
 
 
 def layout_of(content: bytes, kind: str, types: Any, ros1: bool, first: Layout | None = None) -> Layout:
-    """Lay out a message; joints have the numbers that they have in the layout `first`.
-
-    Raises
-    ------
-    Unlike
-        If the bytes are not a message of this type.
-    """
+    """Lay out a message, with joints numbered as in `first`; raises Unlike if its bytes are not of this type."""
     try:
         walk = _Walk(content, types, ros1)
         walk.message(kind, "", "", _holder(types[kind][1]))

@@ -1,6 +1,5 @@
 """Scan the records of a bag of ROS 1, version 2.0."""
 
-import re
 import struct
 from collections import Counter
 from collections.abc import Iterator
@@ -14,11 +13,6 @@ from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
 
 MAGIC_1 = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_RECORD, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
-# A message's header, with its fields in any order, and the length of its content.
-MESSAGE_HEAD = re.compile(
-    rb"\x26\0\0\0(?:\x09\0\0\0conn=(.{4})|\x04\0\0\0op=\x02|\x0d\0\0\0time=(.{8})){3}(.{4})", re.DOTALL
-)
-VALUES = struct.Struct("<IIII").unpack
 U32 = struct.Struct("<I").unpack_from
 Fields = dict[bytes, bytes]
 
@@ -70,9 +64,6 @@ class Rosbag1(Scan):
     def _records(self, content: memoryview, at: int) -> Iterator[tuple[Fields, int, int]]:
         """Yield the fields of each record, and where its data are; only a chunk may end beyond the content."""
         while at < len(content):
-            if self.chunk and (end := self._place_usual(content, at)):
-                at = end
-                continue
             begin = at + 8 + U32(content, at)[0]
             end = begin + U32(content, begin - 4)[0]
             fields = _fields(bytes(content[at + 4 : begin - 4]))
@@ -80,17 +71,6 @@ class Rosbag1(Scan):
                 raise Damage("a record ends beyond the file")
             yield fields, begin, end
             at = end
-
-    def _place_usual(self, content: memoryview, at: int) -> int:
-        """Place a message with the usual fields and return where it ends, else 0; a third of the time of `_fields`."""
-        usual = MESSAGE_HEAD.match(content, at)
-        if not usual or None in (groups := usual.groups()):
-            return 0
-        connection, seconds, nanoseconds, length = VALUES(b"".join(groups))
-        if (end := usual.end() + int(length)) > len(content):
-            return 0
-        self.place(connection, seconds * 10**9 + nanoseconds, usual.end(), end)
-        return end
 
     def _begin(self, fields: Fields) -> None:
         if fields.get(b"encryptor"):

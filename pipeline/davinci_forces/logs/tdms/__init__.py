@@ -27,13 +27,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file, and read the metadata of its file segments.
-
-    Raises
-    ------
-    BadLog
-        If it holds no channel, or one with an unknown scale.
-    """
+    """Open the file, and read its metadata; raises BadLog if it holds no channel, or one with an unknown scale."""
     warnings: list[str] = []
     index, waveforms = Index(), Waveforms()
     with open_file(path) as file:
@@ -93,7 +87,6 @@ class TdmsLog(Log):
     origin: int = 0  # [s] since 1904; the zero of time stamps
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived time channels
     mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel mean two things
-    _paths: dict[str, str] = field(default_factory=dict)  # by name
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples; shorter channels are filled up with NaN."""
@@ -113,7 +106,7 @@ class TdmsLog(Log):
             row += count
 
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        path_of = self._paths = self._paths or {name: path for path, name in self.names.items()}
+        path_of = {name: path for path, name in self.names.items()}
         paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.groups([path for path in paths if path not in self.scaled])
         scaled = self.index.groups([path for path in paths if path in self.scaled])

@@ -33,68 +33,38 @@ SCALES = frozenset(
 )
 
 
-@dataclass(frozen=True)
-class Records:
-    """Layout of the records of one kind: position and number of the samples of each channel."""
-
-    columns: dict[str, Column]
-    counts: dict[str, int]
-
-
 @dataclass
 class Index:
     """The regions of a file, four numbers each, so that millions of them fit in memory."""
 
-    kinds: list[Records] = field(default_factory=list)
-    _holding: dict[str, list[int]] = field(default_factory=dict)  # by path: the kinds with samples of it
-    _by_kind: list[NDArray[np.intp]] = field(default_factory=list)  # numbers of regions, once all are added
+    kinds: list[Region] = field(default_factory=list)  # the first region with these columns and counts
     _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)  # of the kinds
-    _regions: tuple["array[int]", ...] = field(default_factory=lambda: tuple(array("q") for _ in range(4)))
+    _regions: "array[int]" = field(default_factory=lambda: array("q"))  # position, records, stride and kind of each
 
     def add(self, region: Region) -> None:
         """Add a region."""
-        self._by_kind = []
-        last = self.kinds[self._regions[3][-1]] if self.kinds else None
-        if last and last.columns == region.columns and last.counts == region.counts:
-            kind = self._regions[3][-1]
-        else:
-            key = (*region.columns.items(), *region.counts.items())
-            kind = self._numbers.setdefault(key, len(self.kinds))
-            if kind == len(self.kinds):
-                self.kinds.append(Records(region.columns, region.counts))
-                for path in (path for path, count in region.counts.items() if count):
-                    self._holding.setdefault(path, []).append(kind)
-        for numbers, value in zip(self._regions, (region.position, region.records, region.stride, kind), strict=True):
-            numbers.append(value)
+        kind = self._numbers.setdefault((*region.columns.items(), *region.counts.items()), len(self.kinds))
+        if kind == len(self.kinds):
+            self.kinds.append(region)
+        self._regions.extend((region.position, region.records, region.stride, kind))
 
     def groups(self, paths: Sequence[str]) -> list[list[str]]:
         """Group channels with equal numbers of samples in every record, which can be read in one pass."""
-        groups: dict[tuple[tuple[int, int], ...], list[str]] = {}
+        groups: dict[tuple[int, ...], list[str]] = {}
         for path in paths:
-            counts = ((kind, self.kinds[kind].counts[path]) for kind in self._holding.get(path, ()))
-            groups.setdefault(tuple(counts), []).append(path)
+            groups.setdefault(tuple(kind.counts.get(path, 0) for kind in self.kinds), []).append(path)
         return list(groups.values())
 
     def regions(self, path: str) -> Iterator[Region]:
         """Yield the regions with samples of a channel, in order."""
-        position, records, stride, _ = self._regions
-        for i in self._places(path) if path in self._holding else ():
-            kind = self.kinds[self._regions[3][i]]
-            yield Region(position[i], records[i], stride[i], kind.columns, kind.counts)
-
-    def _places(self, path: str) -> list[int]:
-        """List the numbers of the regions with samples of a channel, in order."""
-        if not self._by_kind and self.kinds:
-            kind = np.frombuffer(self._regions[3], np.int64)
-            order = np.argsort(kind, kind="stable")
-            self._by_kind = np.split(order, np.searchsorted(kind[order], np.arange(1, len(self.kinds))))
-        holding = [self._by_kind[kind] for kind in self._holding.get(path, ())]
-        places: list[int] = (holding[0] if len(holding) == 1 else np.sort(np.concatenate(holding))).tolist()
-        return places
+        for position, records, stride, number in zip(*[iter(self._regions)] * 4, strict=True):
+            kind = self.kinds[number]
+            if kind.counts.get(path):
+                yield Region(position, records, stride, kind.columns, kind.counts)
 
     def largest_chunk(self, paths: Sequence[str]) -> int:
         """Return the largest number of samples of any of these channels in one record."""
-        return max((self.kinds[kind].counts[p] for p in paths for kind in self._holding.get(p, ())), default=0)
+        return max((kind.counts.get(path, 0) for path in paths for kind in self.kinds), default=0)
 
 
 def rows_of(channels: int) -> int:
@@ -103,7 +73,7 @@ def rows_of(channels: int) -> int:
 
 
 def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: int) -> Iterator[Block]:
-    """Read the samples of channels of one group, equally many of each in every piece.
+    """Read the samples of channels of one group, which have equally many samples in every region.
 
     `origin` is the zero of time stamps, in seconds since 1904.
     """
@@ -119,22 +89,23 @@ def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], orig
 
 def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Read many complete records at a time."""
-    widest = max(column.count for column in columns.values())
-    many = max(1, min(BLOCK // region.stride, PIECE_ROWS // max(widest, 1)))
+    most = max(column.count for column in columns.values())
+    many = max(1, min(BLOCK // region.stride, PIECE_ROWS // most))
     begin = min(column.offset for column in columns.values())
-    needed = max(
-        column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
-    )
-    span = needed - begin
+    end = max(column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values())
+    span = end - begin
     apart = region.stride - span > MIN_SKIP
+    stride = span if apart else region.stride
     for first in range(0, region.records, many):
         records, start = min(many, region.records - first), region.position + first * region.stride + begin
         if apart:
             raw = b"".join(_read(file, start + i * region.stride, span) for i in range(records))
         else:
             raw = _read(file, start, (records - 1) * region.stride + span)
-        stride = span if apart else region.stride
-        yield {path: _view(raw, records, stride, column, begin) for path, column in columns.items()}
+        yield {
+            path: np.ndarray((records, c.count), c.dtype, raw, c.offset - begin, (stride, c.step))
+            for path, c in columns.items()
+        }
 
 
 def _read(file: BinaryIO, position: int, octets: int) -> bytes:
@@ -142,27 +113,17 @@ def _read(file: BinaryIO, position: int, octets: int) -> bytes:
     return file.read(octets)
 
 
-def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> NDArray[Any]:
-    shape = (records, column.count)
-    if not column.count:
-        return np.empty(shape, column.dtype)
-    return np.ndarray(shape, column.dtype, raw, offset=column.offset - begin, strides=(stride, column.step))
-
-
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Read records too large for memory: a slice of every channel at a time."""
-    most, rows = max(column.count for column in columns.values()), rows_of(len(columns))
+    count, rows = max(column.count for column in columns.values()), rows_of(len(columns))
     for record in range(region.records):
         start = region.position + record * region.stride
-        for first in range(0, most, rows):
-            yield {path: _slice(file, start, column, first, rows) for path, column in columns.items()}
-
-
-def _slice(file: BinaryIO, start: int, column: Column, first: int, rows: int) -> NDArray[Any]:
-    count = max(0, min(rows, column.count - first))
-    return np.frombuffer(
-        _read(file, start + column.offset + first * column.step, count * column.dtype.itemsize), column.dtype
-    )
+        for first in range(0, count, rows):
+            many = min(rows, count - first)
+            yield {
+                path: np.frombuffer(_read(file, start + c.offset + first * c.step, many * c.step), c.dtype)
+                for path, c in columns.items()
+            }
 
 
 def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:

@@ -38,13 +38,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file, and find its format from the first lines.
-
-    Raises
-    ------
-    BadLog
-        If the format is ambiguous or unknown; the message names the key of study.toml to set.
-    """
+    """Open the file, and find its format from the first lines; raises BadLog if that is ambiguous or unknown."""
     lines = Lines(path, options.encoding)
     head = decode(lines.head(), lines.encoding if not lines.mark else None).split("\n")
     try:
@@ -99,13 +93,7 @@ class _Reading:
         self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].has_date}
 
     def blocks(self) -> Iterator[Block]:
-        """Read the blocks of samples.
-
-        Raises
-        ------
-        BadLog
-            At a cell that is not a number, or a row with more cells than columns.
-        """
+        """Yield the blocks of samples; raises BadLog at a cell that is not a number, or a row with too many cells."""
         lines = Lines(self.log.path, self.log.encoding)
         skip = self.dialect.header
         for first, block, _ in lines.blocks():
@@ -198,13 +186,7 @@ class _Reading:
             ) from None
 
     def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
-        """Whether a line holds samples, and is neither a remark between rows nor the header again.
-
-        Raises
-        ------
-        BadLog
-            At another header.
-        """
+        """Whether a line holds samples, and no remark or the header again; raises BadLog at another header."""
         number, times = NUMBERS[self.dialect.decimal], self.dialect.stamps
         if any(map(number.fullmatch, cells)) or not any(cell and cell not in MISSING for cell in cells):
             return True

@@ -44,14 +44,7 @@ class Dialect:
 
 
 def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
-    """Find the format of the first lines of a file.
-
-    Raises
-    ------
-    Unclear
-        If no delimiter makes columns of numbers, a mark may be a decimal mark or something else, or the header has
-        other columns than the rows.
-    """
+    """Find the format of a file from its first lines; raises Unclear if marks or columns have two readings."""
     lines = _unfolded(lines[:SAMPLE_LINES])
     if lines and (separator := SEPARATOR_LINE.fullmatch(lines[0])):
         options, lines = replace(options, delimiter=options.delimiter or separator[1]), ["", *lines[1:]]

@@ -24,13 +24,7 @@ EXPORTS = {
 
 
 def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tuple[str, str]:
-    """Find the delimiter and decimal mark that give the most numbers.
-
-    Raises
-    ------
-    Unclear
-        If none makes columns of numbers, or if a mark may be a decimal mark or something else.
-    """
+    """Find the two marks that give the most numbers; raises Unclear if none does, or one has two readings."""
     occurring = [mark for mark in CANDIDATES if mark == "\t" or any(mark in line for line in body)]
     delimiters = [NAMED.get(options.delimiter, options.delimiter)] if options.delimiter else occurring
     decimals = (options.decimal,) if options.decimal else (".", ",")

@@ -68,13 +68,7 @@ class Stamps:
         return moment.isoformat() if self.has_date else ""
 
     def seconds(self, cells: "pa.ChunkedArray") -> Array:
-        """Convert cells to seconds since zero (N,), NaN where a cell is empty.
-
-        Raises
-        ------
-        pa.ArrowInvalid
-            At a cell of another format.
-        """
+        """Convert cells to seconds since zero (N,), NaN where empty; raises pa.ArrowInvalid at another format."""
         text = pc.replace_substring(pc.utf8_trim_whitespace(cells), ",", ".")
         late = np.zeros(len(text))  # [s] of the second half of the day, and of its first hour, which is written 12
         if self.has_halves:

@@ -11,6 +11,7 @@ from davinci_forces.files import digest
 PACKAGE = Path(__file__).parents[2]
 IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 COMMENT = re.compile(r"#.*")
+_hash_of = cache(digest)  # of a module, which many tasks depend on
 
 
 @cache
@@ -77,8 +78,3 @@ def _files(module: str) -> list[Path]:
     if init.is_file() and "import_module" not in init.read_text(encoding="utf-8"):
         return [init]
     return sorted(f for f in place.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
-
-
-@cache
-def _hash_of(file: Path) -> str:
-    return digest(file)

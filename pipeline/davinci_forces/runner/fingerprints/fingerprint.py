@@ -35,13 +35,7 @@ def hash_of(value: Any) -> str:
 
 
 def canonical(value: Any) -> str:
-    """A text that is equal for two values only if their contents are equal.
-
-    Raises
-    ------
-    TypeError
-        If the value holds a type without such a text.
-    """
+    """A text that is equal for two values only if their contents are; raises TypeError for a type without one."""
     if type(value) in PLAIN:  # the most frequent case
         return repr(value)
     if is_dataclass(value) and not isinstance(value, type):

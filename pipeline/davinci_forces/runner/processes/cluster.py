@@ -43,13 +43,7 @@ def own_terms(mark: str = "") -> Terms:
 
 
 def perform_there(terms: Terms, folders: Folders, task: Task) -> Outcome:
-    """Run a task in a worker of a cluster.
-
-    Raises
-    ------
-    BadRequest
-        If this worker does not see the study's folders, or has other code or libraries.
-    """
+    """Run a task in a worker of a cluster; raises BadRequest if it lacks the folders or has other code."""
     require_terms(terms, folders)
     return perform(folders, task, folders.processed / terms.mark)
 

@@ -109,13 +109,7 @@ class TaskQueue:
         return not self._waiting and not self._running
 
     def outcomes(self) -> Iterator[Outcome]:
-        """Wait for the next outcomes: of one task that runs here, or of tasks that other processes have finished."""
-        for outcome in self._outcomes():
-            self.counts = self.counts[0] + 1, self.counts[1]
-            yield outcome
-
-    def _outcomes(self) -> Iterator[Outcome]:
-        """Wait for the next outcomes, without counting them.
+        """Wait for the next outcomes: of one task that runs here, or of tasks that other processes have finished.
 
         Raises
         ------
@@ -123,9 +117,10 @@ class TaskQueue:
             If other processes were killed too often.
         """
         if self._is_work_for_others():
-            self._started = self._started or self._start()
+            assert self.others is not None
+            self._started = self._started or self.others.start()
             try:
-                self._hand_over()
+                self._hand_over(self._started, self.others.hands)
             except BrokenExecutor:  # one was killed while it was idle
                 if not self._running:
                     self._replace()
@@ -151,17 +146,16 @@ class TaskQueue:
         return self._worked > SECONDS_ALONE and len(self._waiting) > 1  # a single task runs here
 
     def _learn(self, task: Task, seconds: float) -> None:
-        """Update the duration of a task of this step."""
+        """Count a task as done, and update the duration of a task of its step."""
+        self.counts = self.counts[0] + 1, self.counts[1]
         self._durations[task.step] = (self._durations.get(task.step, seconds) + seconds) / 2
 
-    def _hand_over(self) -> None:
-        assert self._started is not None
-        assert self.others is not None
-        while self._waiting and len(self._running) < MAX_QUEUED_SHARES * self.others.hands:
-            share = self._next_share(self.others.hands)
+    def _hand_over(self, executor: Executor, hands: int) -> None:
+        while self._waiting and len(self._running) < MAX_QUEUED_SHARES * hands:
+            share = self._next_share(hands)
             try:  # it may start a process, and `close` must know every one
                 with process.block_interrupts(signal.SIGTERM):
-                    future = self._started.submit(perform_all, share)
+                    future = executor.submit(perform_all, share)
                     self._running[future] = share
             except BrokenExecutor:
                 self._waiting.extendleft(reversed(share))
@@ -207,11 +201,8 @@ class TaskQueue:
         if self.restarts > MAX_RESTARTS:
             raise BrokenExecutor
         self.close()
-        self._started = self._start()
-
-    def _start(self) -> Executor:
         assert self.others is not None
-        return self.others.start()
+        self._started = self.others.start()
 
     def close(self) -> None:
         """End the other processes, and kill those that still work, since nobody reads their results any more."""

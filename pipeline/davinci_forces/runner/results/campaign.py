@@ -92,15 +92,7 @@ def link_to(file: Path, place: Path) -> str:
 
 
 def read_summary(file: Path) -> dict[str, Any]:
-    """Read a summary.json.
-
-    Raises
-    ------
-    MissingRecord
-        If it does not exist.
-    BadRequest
-        If it is not as a report wrote it.
-    """
+    """Read a summary.json; raises MissingRecord if there is none, and BadRequest if it is not as a report wrote it."""
     again = "`davinci-forces report` writes it again"
     try:
         content = json.loads(read_bytes(file))
