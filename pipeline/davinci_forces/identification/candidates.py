@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.errors import NotIdentifiable
 from davinci_forces.identification.observations import CellEquations, Observed, equations, is_evaluated
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -233,14 +234,22 @@ def with_every_term(joint: Joint, reach: Reach) -> IndependentJoint:
 
 
 def residual_variance(part: CandidatePart) -> float:
-    """Return the residual variance of a joint of a coupled arm, with its own parameters."""
-    cells = part.by_block
-    total = sum_all(cells)
-    return float(total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0])
+    """Return the residual variance of a joint of a coupled arm, with its own parameters; infinite if it has none."""
+    total = sum_all(part.by_block)
+    try:
+        return float(total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0])
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
-    """Return the range and the speed of a joint's motion, over all logs that move it."""
+    """Return the range and the speed of a joint's motion, over all logs that move it.
+
+    Raises
+    ------
+    NotIdentifiable
+        If its velocity is 0 throughout, as far as noise lets one tell.
+    """
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
@@ -249,4 +258,9 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
         ranges.append(float(high - low))
         squares += float(dq @ dq)
         count += len(dq)
+    if not squares:
+        names = ", ".join(log.records[0].log for log in logs)
+        raise NotIdentifiable(
+            f"{joint}: its velocity in {names} is lost in noise; check the units and the clock of q and dq"
+        )
     return Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(squares / count))))
