@@ -215,6 +215,9 @@ SLOW: dict[str, dict[str, int]] = {
         "test_a_pipe_in_place_of_what_a_run_made_is_replaced_by_the_next": 1,
         "test_verify_names_what_a_run_made_and_is_no_file_any_more": 1,
     },
+    "test_impossible_logs.py": {
+        "test_no_log_however_impossible_ends_in_a_bug": 7,
+    },
     "test_force_sensor.py": {
         "test_a_simulated_sensor_gives_the_error_the_lag_and_the_coverage_that_were_simulated": 0,
     },

@@ -65,7 +65,7 @@ def test_parameters_that_move_together_are_named_with_their_correlation():
     ((i, j, r),) = correlated_pairs(found, 0.95)
     assert (i, j) == (1, 4)
     names = [*NAMES, "gravity, cosine"]
-    assert f"the estimates of gravity, sine and gravity, cosine are correlated: {r:.2f}" in describe_correlated(
+    assert f'the estimates of "gravity, sine" and "gravity, cosine" are correlated: {r:.2f}' in describe_correlated(
         names, found
     )
     assert describe_correlated(NAMES, of(PHI)) == []

@@ -160,3 +160,26 @@ def test_a_log_without_some_joints_of_the_arm_is_named_with_the_remedy():
     (warning,) = choose.not_of_arm([log("whole", *names), log("part", names[0])], arm.ARM)
     assert warning.severity.tolist() == ["warning"]
     assert warning.text[0].startswith(f"part: no model of the whole arm is fitted to this log, as it lacks {names[1]}")
+
+
+@pytest.mark.parametrize(
+    ("moving", "together"), [([(1, 0, 0), (0, 1, 0)], False), ([(1, 0, 0), (1, 1, 0)], True), ([(0, 1, 0)], True)]
+)
+def test_joints_recorded_one_at_a_time_are_named_with_the_remedy_where_they_couple(moving, together):
+    from davinci_forces.robots import davinci
+
+    names = [joint.name for joint in arm.ARM.joints]
+    logs = [
+        SimpleNamespace(
+            records=[SimpleNamespace(joint=n, at_rest=not m) for n, m in zip(names, moves, strict=True)],
+            is_moving=np.array(moves, bool),
+        )
+        for moves in moving
+    ]
+    warnings = list(choose.never_together(logs, davinci.ROBOT))
+    assert [str(w.text[0]) for w in warnings] == [
+        "arm: no identification log moves hand_roll and hand_pitch together, so the effort that each needs for the "
+        "motion of the others is not identified; record an excitation of all joints together: "
+        "`davinci-forces excite davinci all`"
+    ] * (not together)
+    assert not list(choose.never_together(logs, arm.ARM))  # which has no chain

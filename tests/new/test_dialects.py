@@ -16,6 +16,8 @@ from typer.testing import CliRunner
 import davinci_forces
 from davinci_forces.cli import app
 from davinci_forces.study import reading
+from tests.guide.make_logs import URDF, measured
+from tests.guide.make_logs import motion as arm_motion
 from tests.test_new import effort, motion, table
 from tests.test_runs import call
 
@@ -323,3 +325,72 @@ def test_the_report_says_what_a_missing_contact_changes(tmp_path):
     call("palpate", tmp_path / "raw/a")
     said_of = davinci_forces.read(tmp_path / "raw/a", "Diagnostic")
     assert any('write contact = "all"' in text for text in said_of["text"])
+
+
+def bench(folder, header, *more, names=("run",)):
+    """Logs of the guide's arm of three joints beside its URDF, under other names of the columns."""
+    folder.mkdir(exist_ok=True)
+    (folder / "bench.urdf").write_text(URDF)
+    robot = davinci_forces.robot("bench.urdf", folder)
+    for seed, name in enumerate(names, start=1):
+        t, q, dq, ddq = arm_motion(seed, 3, 20.0, 4.0, 0.4)
+        tau = measured(robot.inverse_dynamics(q, dq, ddq), dq, seed, np.array([2.0, 2.0, 1.0]))
+        table(folder / f"{name}.csv", t, q, dq, tau, *(column(t) for column in more), header=header)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("names", "doubt"),
+    [(["{}_pos", "{}_vel", "{}_torque"], ""), (["pos{}", "vel{}", "tau{}"], ""), (["x{}", "y{}", "z{}"], "CHECK: ")],
+)
+def test_the_robot_beside_the_logs_is_taken_though_no_column_has_the_names_of_its_joints(tmp_path, names, doubt):
+    columns = [name.format(joint) for name in names for joint in ("A", "B", "C")]
+    call("new", bench(tmp_path, ",".join(["t", *columns])))
+    text = (tmp_path / "study.toml").read_text()
+    assert 'robot = "bench.urdf"' in text
+    assert "with 3 joints as they have, paired in order" in text
+    [entry] = reading.read(tmp_path).logs
+    quantities = [f"{joint}.{symbol}" for symbol in ("q", "dq", "tau") for joint in ("pan", "lift", "elbow")]
+    assert {s.quantity: s.channel for s in entry.channels if s.quantity != "time"} == dict(
+        zip(quantities, columns, strict=True)
+    )
+    assert text.count(doubt) >= (9 if doubt else 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (('name="elbow" type="revolute"', 'name="elbow" type="fixed"'), "bench.urdf has 2, so it is not taken"),
+        (('child link="fore"', 'child link="lost"'), "bench.urdf cannot be read: line 13: <joint name='elbow'>"),
+    ],
+)
+def test_why_the_robot_beside_the_logs_is_not_taken_is_said(tmp_path, change, why):
+    bench(tmp_path, "t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3")
+    (tmp_path / "bench.urdf").write_text(URDF.replace(*change, 1))
+    assert f"written for the 3 joints of the logs, as no shipped robot fits; {why}" in " ".join(
+        call("new", tmp_path).split()
+    )
+
+
+def test_a_force_sensor_beside_joints_is_proposed_and_what_a_controller_estimates_is_not(tmp_path):
+    header = "t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3,force_sensor,actual_TCP_force_0,ext_force"
+    call("new", bench(tmp_path, header, np.sin, np.cos, np.tanh))
+    [entry] = reading.read(tmp_path).logs
+    assert [s.channel for s in entry.channels if s.quantity == "force"] == ["force_sensor"]
+    assert "CHECK THIS; a force sensor, to compare the estimate with" in (tmp_path / "study.toml").read_text()
+
+
+def test_where_no_log_can_be_used_the_last_line_says_what_to_do(tmp_path):
+    (tmp_path / "notes.csv").write_text("t,weather,mood\n" + "".join(f"{k},{k % 7},{k % 5}\n" for k in range(50)))
+    last = call("new", tmp_path).strip().splitlines()[-1]
+    assert "written, but no log can be used as it is: give its lines the position and the effort of each joint" in last
+
+
+def test_contact_told_by_the_efforts_of_several_joints_is_to_be_checked(tmp_path):
+    bench(tmp_path, "t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3", names=("a", "b"))
+    rows = np.loadtxt(tmp_path / "b.csv", delimiter=",", skiprows=1)
+    rows[:, 7] += 20 * np.sin(7 * rows[:, 0])
+    table(tmp_path / "b.csv", rows, header="t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3")
+    call("new", tmp_path)
+    assert [entry.role for entry in reading.read(tmp_path).logs] == ["identification", "contact"]
+    assert 'role = "contact"  # CHECK: a contact, or coupled joints: ' in (tmp_path / "study.toml").read_text()

@@ -101,7 +101,7 @@ def _progress() -> "ReportStart":
 
 
 def _document(robot: str, answered: "Answer") -> dict[str, Any]:
-    trajectories, arm = answered
+    trajectories, arm, _ = answered
     if len(trajectories) == 1:
         return {"robot": robot, **trajectories[0].facts()}
     totals = _totals(arm) if arm else {"objective": sum(e.objective for e in trajectories)}
@@ -117,7 +117,7 @@ def _totals(arm: "ArmExcitation") -> dict[str, Any]:
 
 
 def _format_text(answered: "Answer") -> str:
-    trajectories, arm = answered
+    trajectories, arm, held = answered
     lines = []
     if arm:
         base = f"{arm.base_parameters} base parameters"
@@ -125,6 +125,11 @@ def _format_text(answered: "Answer") -> str:
         lines += [_spread(_totals(arm)["starts"]), f"  {_checked(arm)}", *_error_lines(arm.standard_errors)]
     for e in trajectories:
         lines += _lines(e)
+    if held:
+        pose = f"hold {', '.join(held)} where they are in the logs to be evaluated"
+        lines += [
+            f"  {pose}: the model of {trajectories[0].joint.name} alone holds in that pose; `all` moves them, too"
+        ]
     return "\n".join(lines)
 
 

@@ -32,7 +32,11 @@ def run(
         raise BadRequest(f"{target} exists already; move it away, or print the new one with --print")
     if draft.robot_file:
         write_bytes(folder / draft.robot_file, draft.robot_text.encode())
-        echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
+        echo(f"{folder / draft.robot_file}: {draft.robot_reason}; check the kinds of its joints and their terms")
     write_bytes(target, draft.text.encode())
     echo("\n".join(table([("file", "role", "rate", "joints", "look at"), *draft.rows])))
-    echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")
+    if all(row.role in ("left out", "-") for row in draft.rows):
+        remedy = "give its lines the position and the effort of each joint, uncomment them"
+        echo(f"{target}: written, but no log can be used as it is: {remedy}, and run `davinci-forces all {folder}`")
+    else:
+        echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")

@@ -5,10 +5,12 @@ A library is a model with every friction that may be added.  A candidate is a ch
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.errors import NotIdentifiable
 from davinci_forces.identification.observations import CellEquations, Observed, equations, is_evaluated
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -164,7 +166,7 @@ def candidates(
     models += variants(robot, "coupled", reaches, libraries)
     if share_parameters(robot, rows):
         plain = next(c for c in models if c.structure == "coupled" and not c.added)
-        weights = 1.0 / np.array([residual_variance(part) for part in plain.parts])
+        weights = weights_of(plain.parts)
         shared = library(coupled_joints(robot, rows, added), arm, count)
         models += variants(robot, "coupled", reaches, [shared], weights)
     return models
@@ -232,15 +234,28 @@ def with_every_term(joint: Joint, reach: Reach) -> IndependentJoint:
     return independent(joint, (*every_term(reach), *(() if offset in joint.terms else (offset,))))
 
 
-def residual_variance(part: CandidatePart) -> float:
-    """Return the residual variance of a joint of a coupled arm, with its own parameters."""
-    cells = part.by_block
-    total = sum_all(cells)
-    return float(total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0])
+def weights_of(parts: Sequence[CandidatePart]) -> Array:
+    """Return the weights (m,) of the joints of a coupled arm, the inverse of the residual variance by their own models.
+
+    A joint has weight 0 if its own model has no solution or leaves no residual, as of an effort that is 0 throughout.
+    """
+    weights = np.zeros(len(parts))
+    for i, part in enumerate(parts):
+        total = sum_all(part.by_block)
+        with suppress(np.linalg.LinAlgError):
+            variance = total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0]
+            weights[i] = 1.0 / variance if variance else 0.0
+    return weights
 
 
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
-    """Return the range and the speed of a joint's motion, over all logs that move it."""
+    """Return the range and the speed of a joint's motion, over all logs that move it.
+
+    Raises
+    ------
+    NotIdentifiable
+        If its velocity is 0 throughout, as far as noise lets one tell.
+    """
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
@@ -249,4 +264,9 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
         ranges.append(float(high - low))
         squares += float(dq @ dq)
         count += len(dq)
+    if not squares:
+        names = ", ".join(log.records[0].log for log in logs)
+        raise NotIdentifiable(
+            f"{joint}: its velocity in {names} is lost in noise; check the units and the clock of q and dq"
+        )
     return Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(squares / count))))

@@ -22,7 +22,7 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
     A combination of the two parameters of a reported pair is not reported again.
     """
     correlated = least_squares.correlated_pairs(conditioning, MIN_CORRELATION)
-    texts = [f"the estimates of {names[i]} and {names[j]} are correlated: {r:.2f}" for i, j, r in correlated]
+    texts = [f"the estimates of {join_names([names[i], names[j]])} are correlated: {r:.2f}" for i, j, r in correlated]
     reported = [{i, j} for i, j, _ in correlated]
     for members, ratio in least_squares.uncertain_combinations(conditioning, MIN_UNCERTAINTY_RATIO, MIN_PART_NAMED):
         if len(members) > 1 and set(members) not in reported:
@@ -51,14 +51,16 @@ def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]
 
 def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
     """Recommend what to record next; "" without problems."""
-    return f"{excite_command(robot, joint)} designs a motion that excites these parameters best" if problems else ""
+    return (
+        f"{excite_command(robot, joint.name)} designs a motion that excites these parameters best" if problems else ""
+    )
 
 
-def excite_command(robot: Robot, joint: Joint) -> str:
-    """Return the command that designs a motion of a joint, and where to run it if the robot is a file."""
+def excite_command(robot: Robot, joint: str) -> str:
+    """Return the command that designs a motion of a joint, or of `all`, and where to run it if the robot is a file."""
     listed = robot.name in ROBOTS and not robot.file
     name = robot.name if listed else robot.file or f"{robot.name}.toml"
-    return f"`davinci-forces excite {name} {joint.name}`" + ("" if listed else " in the study's folder")
+    return f"`davinci-forces excite {name} {joint}`" + ("" if listed else " in the study's folder")
 
 
 def why_not_positive(
@@ -77,7 +79,7 @@ def why_not_positive(
     if value > -MIN_Z * std:
         text = f"{inertia} cannot be distinguished from 0, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
-        return f"{text}; record the joint {by_itself}with larger accelerations: {excite_command(robot, joint)}"
+        return f"{text}; record the joint {by_itself}with larger accelerations: {excite_command(robot, joint.name)}"
     friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
     negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and negative_friction.sum() * 2 >= friction.sum():
@@ -85,7 +87,7 @@ def why_not_positive(
         return f"{text}; correct the `sign` of the effort or of the position"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
-        return f"{text}{omitted}; record the joint by itself: {excite_command(robot, joint)}"
+        return f"{text}{omitted}; record the joint by itself: {excite_command(robot, joint.name)}"
     causes = "effort and motion may be logged at different times, or friction acts as a spring at reversals"
     return f"{text}: {causes}"
 
@@ -102,8 +104,8 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
 
 
 def join_names(names: Sequence[str]) -> str:
-    """Join names: 'a, b and c'."""
-    *others, last = names
+    """Join names: 'a, b and c', with quotes around one that has a comma."""
+    *others, last = (f'"{name}"' if "," in name else name for name in names)
     return f"{', '.join(others)} and {last}" if others else last
 
 

@@ -18,9 +18,9 @@ from davinci_forces.identification.candidates import (
     Library,
     coupled_joints,
     library,
-    residual_variance,
     ridge_name,
     share_parameters,
+    weights_of,
 )
 from davinci_forces.identification.observations import Observed, Processing
 from davinci_forces.maths.arrays import Array, Booleans, evenly
@@ -257,7 +257,7 @@ def searched_candidates(
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
     if len(coupled) == len(separate) and share_parameters(robot, rows):
         alone_parts = [searched_part(robot, search, arm, count) for search in coupled]
-        weights = 1.0 / np.array([residual_variance(part) for part in alone_parts])
+        weights = weights_of(alone_parts)
         for alone in [None, *range(len(coupled))] if len(coupled) > 2 else [None]:
             sharing = [i for i in range(len(coupled)) if i != alone]
             part = shared_part(robot, [coupled[i] for i in sharing], arm, count, weights[sharing])

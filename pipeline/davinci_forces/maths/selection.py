@@ -122,10 +122,19 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
 
 
 def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
-    """Covariance (p, p) of the parameters under independent noise of each effort, with a variance (m,)."""
+    """Covariance (p, p) of the parameters under independent noise of each effort, with a variance (m,).
+
+    Raises
+    ------
+    LinAlgError
+        If rounding makes a variance negative.
+    """
     scaled, size = scaled_equations(equations, ridge)
     inverse = np.linalg.inv(scaled) / size / size[:, None]
-    return np.asarray(inverse @ np.einsum("m,mpq->pq", ridge.weights**2 * variances, equations.gram[0]) @ inverse)
+    result = np.asarray(inverse @ np.einsum("m,mpq->pq", ridge.weights**2 * variances, equations.gram[0]) @ inverse)
+    if np.diag(result).min() < 0.0:
+        raise np.linalg.LinAlgError("the columns are linearly dependent but for rounding")
+    return result
 
 
 def penalty(G: Array, combination: Array) -> Array:

@@ -170,7 +170,10 @@ class Record:
         """Return the column if all its numbers are finite."""
         if column.dtype.kind == "f" and name not in self.UNKNOWN and not np.isfinite(column).all():
             rows = np.flatnonzero(~np.isfinite(column))
-            raise BadRecord(f"{self}: {name} has {len(rows)} values that are not finite, the first at row {rows[0]}")
+            raise BadRecord(
+                f"{self}: {name} has {len(rows)} values that are not finite, the first at row {rows[0]}; look at the "
+                "remarks on the logs, and check the units and columns of their channels in study.toml"
+            )
         return column
 
     def __str__(self) -> str:

@@ -11,6 +11,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from davinci_forces.errors import BadLog, PipelineError
 from davinci_forces.files import digest
 from davinci_forces.logs.log import Log
@@ -78,6 +80,9 @@ def error_message(error: Exception) -> str:
         return str(error)
     frame = traceback.extract_tb(error.__traceback__)[-1]
     bug = f"{type(error).__name__}: {error} ({Path(frame.filename).name}:{frame.lineno} in {frame.name})"
+    if isinstance(error, np.linalg.LinAlgError):
+        why = "its equations have no solution, as of a channel of constants or noise, or in another unit"
+        return f"{bug}: {why}; look at the remarks on the logs, check their channels, and report it if they are right"
     return f"{bug}: a bug of davinci-forces, not an error in the data; please report it"
 
 

@@ -53,11 +53,29 @@ class Arm(NamedTuple):
 def candidates(folder: Path) -> list[Arm]:
     """The robots whose joints the channels of logs may name: those described beside the logs, then the listed ones."""
     arms = []
-    for file in sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")]):
-        if file.name not in ("study.toml", "review.toml"):
-            with suppress(BadRobot):
-                arms.append(Arm(file.name, robots.load(file.name, folder), "the file beside the logs"))
+    for file in _robot_files(folder):
+        with suppress(BadRobot):
+            arms.append(Arm(file.name, robots.load(file.name, folder), "the file beside the logs"))
     return [*arms, *(Arm(name, robots.load(name, folder), "") for name in robots.ROBOTS)]
+
+
+def _robot_files(folder: Path) -> list[Path]:
+    """The files beside the logs that may describe a robot."""
+    files = sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")])
+    return [file for file in files if file.name not in ("study.toml", "review.toml")]
+
+
+def _why_not(folder: Path, n: int) -> str:
+    """Why the robots described beside the logs are not those of `n` joints."""
+    reasons = []
+    for file in _robot_files(folder):
+        try:
+            count = len(robots.load(file.name, folder).joints)
+            reasons.append(f"{file.name} has {count}, so it is not taken, but by --robot {file.name}")
+        except BadRobot as why:
+            problem = str(why).splitlines()[-1].strip().replace(f"{folder / file.name}:", "line ")
+            reasons.append(f"{file.name} cannot be read: {problem}")
+    return "".join(f"; {reason}" for reason in reasons)
 
 
 def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> Arm:
@@ -66,9 +84,10 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
     `names` are those of the folder, the files and the channels, which may name a robot.
     """
     counted = [holding for holding in holdings if holding.joints]
-    if not counted:
-        return Arm(DEFAULT_ROBOT, robots.load(DEFAULT_ROBOT, folder), "")
     arms = candidates(folder)
+    if not counted:
+        described = [arm for arm in arms if arm.reason]
+        return described[0] if len(described) == 1 else next(arm for arm in arms if arm.name == DEFAULT_ROBOT)
     for arm in arms:
         if any(holding.robot == arm.robot for holding in counted):
             return _of_the_kit(arm, names, folder)._replace(reason=arm.reason or "by the joints in channel names")
@@ -76,7 +95,7 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
     current = any("i" in holding.symbols() for holding in counted)
     beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
     if beside:
-        return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have")
+        return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")
     words = {word for name in names for word in words_of(name)}
     said = next((word for word in DAVINCI_WORDS if word in words), "")
     if all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
@@ -91,10 +110,9 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
     text = robot_text(_joint_names(largest), current, _prismatic(counted), _limits(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
-    joints = "joint" if n == 1 else f"{n} joints"
-    return Arm(
-        name, new_robot, f"written for the {joints} of the logs, as no shipped robot fits; --robot names one", text
-    )
+    joints, why_not = "joint" if n == 1 else f"{n} joints", _why_not(folder, n)
+    reason = f"written for the {joints} of the logs, as no shipped robot fits{why_not or '; --robot names one'}"
+    return Arm(name, new_robot, reason, text)
 
 
 def _of_the_kit(arm: Arm, names: Sequence[str], folder: Path) -> Arm:

@@ -1,7 +1,7 @@
 """Assign the channels of a log to quantities and units: by [log.channels], or by names for pushes into tissue."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,7 @@ WORDS_BY_QUANTITY = {
     "push": ("push", "probe", "poke", "press", "indent", "trial"),
 }
 RESULTANT_WORDS = ("norm", "magnitude", "total", "resultant", "abs")  # a force of such a name is preferred
+ESTIMATED_WORDS = {"tcp", "ext", "external", "estimated", "model", "predicted", "desired", "target", "command", "ref"}
 AXES = ("x", "y", "z")
 TIP_WORDS = {"tip", "tool", "pos", "position", "end", "effector", "ee", "probe", "m", "mm", "um", *AXES}
 
@@ -160,6 +161,15 @@ def tissue_channels(channels: Sequence[Channel]) -> dict[str, str]:
         if not set(names) <= set(several):
             several = {quantity: named for quantity, named in several.items() if quantity not in names}
     return {_best(named).name: quantity for quantity, named in several.items()}
+
+
+def force_sensor(quantities: Mapping[str, str]) -> dict[str, str]:
+    """Of quantities by channel name, the force that a sensor beside an arm measures: no estimate, no component."""
+    return {
+        name: quantity for name, quantity in quantities.items()
+        if quantity in ("force", *FORCE) and not ESTIMATED_WORDS & set(words := re.findall("[a-z]+", name.lower()))
+        and not (quantity == "force" and (re.search(r"\d", name) or "f" in words))
+    }  # fmt: skip
 
 
 def is_tissue(quantities: Sequence[str]) -> bool:

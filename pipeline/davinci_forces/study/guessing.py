@@ -15,6 +15,8 @@ from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study.names import (
     IN_DEGREES,
+    PROCESSED_WORDS,
+    SIGNAL_WORDS,
     Numbered,
     is_time,
     joint_groups,
@@ -96,7 +98,7 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     holdings = [by_joint_names(numbers, robot) for robot in robots]
     holding = max(holdings, key=lambda h: len(h.meanings) if h.is_complete else -1, default=Holding())
     if not holding.is_complete:
-        holding = by_numbers(numbers)
+        holding = max(by_numbers(numbers), by_words(numbers), key=lambda h: len(h.meanings))
     if holding.is_complete:
         return _read_motion(log, holding)
     if any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
@@ -104,6 +106,12 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
         samples = {name: samples_of(log, [name])[name] for name in times}
         timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
         by_name = timing.missing and times and not has_clock(log)
+        content = _by_content(log, [channel.name for channel in numbers])
+        if any(robot.file and len(robot.joints) == content.joints for robot in robots):
+            check = {
+                n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
+            }
+            return replace(content, meanings=check)
         return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
     return _by_content(log, [channel.name for channel in numbers])
 
@@ -194,6 +202,25 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     meanings = _with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
+
+
+def by_words(channels: Sequence[Channel]) -> Holding:
+    """Assign joints by what names say beside the quantity, alike for positions and efforts: `base_pos`, `torqueA`."""
+    named: dict[str, dict[str, str]] = {}
+    for channel in channels:
+        words = words_of(channel.name)
+        if not is_time(channel) and (symbol := symbol_of(words)):
+            label = "_".join(word for word in words if word not in SIGNAL_WORDS[symbol])
+            named.setdefault(symbol, {}).setdefault(label, channel.name)
+    labels = [*named.get("q", ())]
+    alike = any(set(named.get(effort, ())) == set(labels) for effort in ("tau", "i"))
+    if len(labels) < 2 or not alike or {*PROCESSED_WORDS} & {word for label in labels for word in label.split("_")}:
+        return Holding()
+    meanings = {
+        name: Meaning(symbol, labels.index(label), f"joint {label!r}")
+        for symbol, names in named.items() for label, name in names.items() if label in labels
+    }  # fmt: skip
+    return Holding(_with_one_effort(meanings), len(labels), tuple(labels))
 
 
 def _usual(symbol: str, words: Sequence[str]) -> str:

@@ -30,6 +30,7 @@ OTHER_WORDS = {
     "acceleration", "dtau", "jaw", "gripper",
 }  # fmt: skip
 ROUGH_WORDS = ("raw", "unfiltered")  # a signal of such a name is taken where there is no other
+PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "measured", "actual")  # of no joint
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
 TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI

@@ -107,7 +107,14 @@ def _touched(holding: Holding) -> str:
     if holding.ranges and not holding.moving:
         return "no joint moves in it, so nothing can be identified from it"
     pushed = [str(joint + 1) for joint, course in holding.courses.items() if has_outliers(course)]
-    return f"the effort of joint {', '.join(pushed)} has outliers, as pushes make them" if pushed else ""
+    return (
+        f"{_check(holding)}the effort of joint {', '.join(pushed)} has outliers, as pushes make them" if pushed else ""
+    )
+
+
+def _check(holding: Holding) -> str:
+    """Mark an effort that the motion of other joints may explain, which a model of one joint does not know."""
+    return "CHECK: a contact, or coupled joints: " if len(holding.courses) > 1 else ""
 
 
 def _unlike(holding: Holding, references: Sequence[Holding]) -> str:
@@ -116,7 +123,7 @@ def _unlike(holding: Holding, references: Sequence[Holding]) -> str:
         same: list[Course] = [other.courses[joint] for other in references if joint in other.courses]
         share = unexplained_share(course, same) if same else 0.0
         if share >= MIN_UNEXPLAINED:
-            return f"{share:.0%} of the effort of joint {joint + 1} is not as in free motion"
+            return f"{_check(holding)}{share:.0%} of the effort of joint {joint + 1} is not as in free motion"
     return ""
 
 

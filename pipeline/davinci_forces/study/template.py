@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from davinci_forces.study.belonging import (
     guess_joined,
     split_signal,
 )
-from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, is_tissue, tissue_channels, unit_of
+from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, force_sensor, is_tissue, tissue_channels, unit_of
 from davinci_forces.study.entries import ROLES, is_inside
 from davinci_forces.study.guessing import Holding, Meaning, guess
 from davinci_forces.study.names import is_time, stated_unit
@@ -54,16 +54,21 @@ class Draft(NamedTuple):
     robot_file: str = ""
     robot_text: str = ""
     rows: tuple[Row, ...] = ()
+    robot_reason: str = ""
 
 
 @dataclass(frozen=True)
 class DraftLog:
-    """One [[log]]: its files, the opened log, the guess of its channels, and its pushes' quantities by channel."""
+    """One [[log]]: its files, the opened log, the guess of its channels, and the quantities of its pushes by channel.
+
+    Beside joints, the quantities are those of a force sensor, in `sensor`.
+    """
 
     files: list[Path]
     log: Log
     guess: Holding
     touching: dict[str, str]
+    sensor: dict[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -114,7 +119,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     arms = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else candidates(folder)
     drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
     if not drawn:
-        raise BadLog("\n".join(refused.values()))
+        what = "no log can be read, so no study is written; export the logs again, or name other files"
+        raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
     names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]
     arm = arms[0] if robot_name else arm_of([draft.guess for draft in drawn], folder, names)
@@ -129,7 +135,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
         rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
-    return Draft(text, arm.name if arm.text else "", arm.text, tuple(rows))
+    return Draft(text, arm.name if arm.text else "", arm.text, tuple(rows), arm.reason)
 
 
 def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
@@ -152,7 +158,9 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     holding = guess(log, listed)
     touching = tissue_channels([channel for channel in log.channels if not is_time(channel)])
     touching = {name: quantity for name, quantity in touching.items() if name not in holding.meanings}
-    return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) and not holding.meanings else {})
+    if holding.meanings:
+        return DraftLog(files, log, holding, {}, force_sensor(touching))
+    return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) else {})
 
 
 def _recording(draft: DraftLog, folder: Path, robot: Robot) -> Evidence:
@@ -340,7 +348,11 @@ class _Writer:
             meaning = holding.meanings.get(channel.name)
             if channel.derived:
                 continue
-            if channel.name in touching:
+            if channel.name in self.draft.sensor:
+                line = _touch_line(channel, self.draft.sensor[channel.name], in_millimetres=False)
+                sensor = "a force sensor, to compare the estimate with"
+                yield f"{line}; {sensor}" if "CHECK" in line else f"{line}  # CHECK: {sensor}"
+            elif channel.name in touching:
                 yield _touch_line(channel, touching[channel.name], channel.name in big)
             elif meaning:
                 yield self._meaning_line(channel, meaning, channel.name in unknown)

@@ -66,10 +66,11 @@ class ArmExcitation(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A trajectory for each requested joint, and the excitation of the arm where its links are known."""
+    """A trajectory for each requested joint; the excitation of the arm if its links are known, or the joints held."""
 
     trajectories: list[ExcitationTrajectory]
     arm: ArmExcitation | None = None
+    held: tuple[str, ...] = ()
 
 
 def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
@@ -104,7 +105,8 @@ def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
         efforts = [joint.limits.effort for joint in joints]
         arm = arm_problem(robot.chain, problems, robot.bodies, efforts, _obstacles(request))
         return _of_arm(request, robot, arm, noise, report_start)
-    return Answer([_excitation(request, *part, report_start) for part in zip(joints, problems, noise, strict=True)])
+    excitations = [_excitation(request, *part, report_start) for part in zip(joints, problems, noise, strict=True)]
+    return Answer(excitations, held=tuple(j.name for j in robot.joints if robot.chain is not None and j not in joints))
 
 
 def _of_arm(

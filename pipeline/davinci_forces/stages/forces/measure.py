@@ -80,14 +80,20 @@ def level_while_identified(track: Track, entry: LogEntry) -> float:
 
 def contacts(
     track: Track, threshold: Threshold, placed: Sequence[tuple[Window, Event | None, bool]]
-) -> Iterator[Contact]:
-    """The Contact of one joint of a log, if any sample lies in one of the joint's contacts.
+) -> Iterator[Contact | Diagnostic]:
+    """The Contact of one joint of a log, if any sample lies in one of the joint's contacts, and any outside them.
 
     A contact is not found if the 95 % interval of its peak holds zero, as where the arm swings after a larger push.
     """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
     free = free if free.any() else free_smoothed(track.t, windows, track.rate)
+    if not free.any():
+        name = f"{track.log}/{track.joint}"
+        remedy = "record some free motion, too, or check units and columns if nothing touched the arm"
+        text = f"{name}: contacts take up the whole log, so none is measured; {remedy}"
+        yield diagnostic("measure", f"{track.log}.{track.joint}", "warning", text)
+        return
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     rows, above = [], []

@@ -17,7 +17,7 @@ from davinci_forces.identification.chosen import (
     parameters,
     select_candidate,
 )
-from davinci_forces.identification.identifiability import join_names
+from davinci_forces.identification.identifiability import excite_command, join_names
 from davinci_forces.identification.observations import Observed, is_evaluated, observe
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
@@ -61,8 +61,9 @@ def run(
     separate, arm = modelled_logs(logs, robot)
     if not separate:
         return
-    if arm:
+    if robot.chain is not None and any(log.is_moving.sum() > 1 for log in logs):
         yield from not_of_arm(logs, robot)
+    yield from never_together(logs, robot)
     reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
     fixed = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), len(logs))
     if fixed is None:
@@ -136,6 +137,16 @@ def not_of_arm(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
             text = f"{first.log}: no model of the whole arm is fitted to this log, as it lacks {join_names(lacking)}"
             remedy = f"to fit it, name their channels, on the clock of {first.joint}, also where a joint does not move"
             yield diagnostic("choose", "arm", "warning", f"{text}; {remedy}")
+
+
+def never_together(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
+    """Warn of a robot with a chain if no log moves all joints together that the logs move."""
+    moved = {record.joint for log in logs for record in log.records if not record.at_rest}
+    joints = [joint.name for joint in robot.joints if joint.name in moved]
+    if robot.chain is not None and len(joints) > 1 and not any(log.is_moving.sum() >= len(joints) for log in logs):
+        text = f"arm: no identification log moves {join_names(joints)} together, so the effort that each needs for the "
+        remedy = f"record an excitation of all joints together: {excite_command(robot, 'all')}"
+        yield diagnostic("choose", "together", "warning", f"{text}motion of the others is not identified; {remedy}")
 
 
 def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
@@ -212,7 +223,7 @@ def consistent_fits(
         model = part.model
         try:
             consistent = fit_consistent(part, free)
-        except NotIdentifiable as error:
+        except (NotIdentifiable, np.linalg.LinAlgError) as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
             yield diagnostic("choose", model.group, "warning", message)
             continue

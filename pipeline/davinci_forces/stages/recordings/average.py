@@ -44,7 +44,8 @@ def run(
         )
     if not moving:
         raise NotPeriodic(
-            f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
+            f"{entry.name}: no joint moves, so there is nothing to identify; check its channels, their units, and the "
+            f"clock, of {signals[0].rate:.4g} Hz"
         )
     max_harmonics = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)

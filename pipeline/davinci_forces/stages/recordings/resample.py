@@ -1,6 +1,7 @@
 """Resample every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +23,7 @@ from davinci_forces.maths.signals.smoothing import (
 from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
 from davinci_forces.maths.signals.windows import runs
 from davinci_forces.records import Column, Counts, Diagnostic, Motion, Recording, Signal, diagnostic
-from davinci_forces.robots.robot import Joint
+from davinci_forces.robots.robot import Joint, Kind
 
 Indices = NDArray[np.intp]
 
@@ -30,7 +31,18 @@ EVEN = 0.02  # of a sampling time: a clock that deviates less than this from a u
 MIN_MOTION = 0.01  # of a joint's range, or of 1 rad or 1 m without limits: a joint that moves less is at rest
 VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with the derivative of the position
 MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
-MAX_POSITION = 20.0  # as a multiple of a joint's limits
+MAX_VELOCITY_RATIO = 5.0  # beyond it or below its inverse, the log contradicts itself, and is refused
+MAX_BEYOND_LIMITS, IMPOSSIBLE = 2.0, 20.0  # as multiples of a joint's limits; a warning, and a refusal
+MIN_JUMP, MAX_USUAL = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
+UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the position; mm only of joints that slide
+    (180.0 / np.pi, 'is the velocity in deg/s? write unit = "deg/s" for its channel'),
+    (np.pi / 180.0, 'is the position in degrees? write unit = "deg" for its channel'),
+    (30.0 / np.pi, 'is the velocity in rpm? write unit = "rpm" for its channel'),
+    (1e3, 'is the velocity in mm/s? write unit = "mm/s" for its channel'),
+    (1e3, 'is the time in ms? write unit = "ms" for its channel'),
+    (1e-3, 'is the position in mm? write unit = "mm" for its channel'),
+    (-1.0, "is the sign of one opposite? write sign = -1 for its channel"),
+)
 MIN_SAMPLES_SEGMENT = 4  # for a cubic spline
 MAX_LISTED_STRETCHES = 3  # in a remark
 
@@ -41,7 +53,8 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     Raises
     ------
     BadLog
-        If no segment between gaps holds more than a few samples.
+        If no segment between gaps holds more than a few samples, velocity and position contradict each other, or the
+        motion lies far beyond the joint's limits.
     """
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
     cuts = (np.flatnonzero(are_gaps(recording.t, T_s)) + 1).tolist()
@@ -62,18 +75,20 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     if recording.velocity == "derived":
         dq = smooth[1]
     at_rest = not moves(q, joint)
+    wrong = [*velocity_faults(recording, joint, q, dq, segment, 1.0 / T_s), *limit_faults(recording, joint, smooth)]
     signal = Signal.like(
         recording, rate=1.0 / T_s, method=method, gaps=len(parts) - 1, at_rest=int(at_rest), t=t, q=q, dq=dq, tau=tau,
         segment=segment, filled=filled,
     )  # fmt: skip
-    yield signal
     motion = without_noise(signal, smooth, lowpass)
+    if motion.standing.all() and not at_rest:  # nothing of it could be fitted
+        at_rest, signal, motion = True, replace(signal, at_rest=1), replace(motion, at_rest=1)
+    yield signal
     yield motion
     yield from remarks(signal, recording, T_s, cuts, sum(part.stop - part.start for part in parts))
     if recording.role not in ("tissue", "friction") and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
-    wrong = [] if at_rest else [*velocity_faults(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
-    if wrong:
+    if wrong := [*wrong, *(() if at_rest else faults(recording))]:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
 
@@ -111,38 +126,93 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     )  # fmt: skip
 
 
-def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
-    """State where a logged velocity differs from the derivative of the logged position, both low-passed."""
-    if recording.velocity == "derived":
-        return []
+def velocity_faults(
+    recording: Recording, joint: Joint, q: Column, dq: Column, segment: Indices, rate: float
+) -> Iterator[str]:
+    """State where a logged velocity differs from the derivative of the logged position, both low-passed.
+
+    Raises
+    ------
+    BadLog
+        If one is several times the other.
+    """
+    if recording.velocity == "derived" or not (moves(q, joint) or moves(np.cumsum(dq - dq.mean()) / rate, joint)):
+        return
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
-    expected, logged = slow_velocity(q, segment, rate, cutoff), lowpass_segments(dq, segment, rate, cutoff)
-    slope = float(expected @ logged / (expected @ expected))
-    if abs(slope - 1) < MAX_VELOCITY_ERROR:
-        return []
-    return [
-        f"{recording.log}/{recording.joint}: the logged velocity is {slope:.3g} times the derivative of the logged "
-        "position; check the sign, unit and column of both, and the rate of the clock"
-    ]
+    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), slow_velocity(q, segment, rate, cutoff))
+    if abs(ratio - 1) < MAX_VELOCITY_ERROR:
+        return
+    hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
+    fitting = (hint for hint in hints if joint.kind is Kind.PRISMATIC or "mm" not in hint)
+    hint = next(fitting, "check the sign, unit and column of both, and the rate of the clock")
+    fault = (
+        f"{recording.log}/{recording.joint}: the logged velocity is {ratio:.3g} times the derivative of the logged "
+        f"position; {hint}"
+    )
+    if not 1 / MAX_VELOCITY_RATIO < ratio < MAX_VELOCITY_RATIO:
+        raise BadLog(f"{fault}; without the channel of the velocity, it is derived from the position")
+    yield fault
 
 
-def faults(recording: Recording, joint: Joint) -> Iterator[str]:
-    """State where a sensor was stuck, a drive was at its limit, or a unit differs from the stated one."""
-    name, far = f"{recording.log}/{recording.joint}", max(map(abs, joint.limits.q))
-    for stop in find_stuck(recording.t, recording.q):
+def median_ratio(x: Column, reference: Column) -> float:
+    """Median of x / reference (N,), weighted by the size of the reference; infinite if that is 0 throughout."""
+    known = np.abs(reference) > 1e-12 * np.abs(reference).max()
+    ratio, weight = x[known] / reference[known], np.abs(reference[known])
+    order = np.argsort(ratio)
+    half = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
+    return float(ratio[order[half]]) if known.any() else np.inf
+
+
+def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[str]:
+    """State where low-passed positions and velocities lie beyond the joint's limits.
+
+    Raises
+    ------
+    BadLog
+        If they lie so far beyond that no motion of this joint is like that.
+    """
+    beyond, largest = [], 0.0
+    names = ("positions", "{position}"), ("velocities", "{position}/s")
+    for (what, unit), x, limits in zip(names, smooth, (joint.limits.q, joint.limits.dq), strict=False):
+        reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, limits))
+        if reach > MAX_BEYOND_LIMITS * limit:
+            times = f"{reach / limit:.3g} times the limit of {limit:.3g}"
+            beyond.append(joint.unit(f"{what} reach {reach:.3g} {unit}, {times} {unit}"))
+            largest = max(largest, reach / limit)
+    if beyond:
+        units = "degrees" if joint.kind is Kind.REVOLUTE else "mm"
+        fault = (
+            f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts? write the "
+            f'unit of the channel in study.toml, as unit = "{units[:3]}", or correct the limits of the robot'
+        )
+        if largest > IMPOSSIBLE:
+            raise BadLog(fault)
+        yield fault
+
+
+def faults(recording: Recording) -> Iterator[str]:
+    """State where a position was stuck or jumps, or a drive was at its limit."""
+    name, q = f"{recording.log}/{recording.joint}", recording.q
+    for stop in find_stuck(recording.t, q):
         yield (
             f"{name}: the position stands still from {stop.start:.3f} to {stop.end:.3f} s and then jumps by "
             f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
-    if samples := count_saturated(recording.tau):
+    step = np.diff(q)
+    jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL * np.quantile(np.abs(step), 0.99)))
+    if len(jumps):
+        yield (
+            f"{name}: the position jumps by {step[jumps[0]]:.3g} within one sample at {recording.t[jumps[0]]:.3f} s"
+            f"{f' and {len(jumps) - 1} times more' if len(jumps) > 1 else ''}, as of an angle that wraps or a sensor "
+            "that fails; leave that out by `skip` and `until`, or record it again"
+        )
+    if not np.ptp(recording.tau):
+        yield f"{name}: the effort is {recording.tau[0]:.3g} throughout; check the column of its channel"
+    elif samples := count_saturated(recording.tau):
         yield (
             f"{name}: the effort is exactly at its largest or smallest value in {samples} samples: the drive or its "
             "sensor was saturated, so the true effort may be larger than the log says; record with less effort"
         )
-    size = np.abs(recording.q)
-    if size.max() > MAX_POSITION * far and (reach := float(np.percentile(size, 99.0))) > MAX_POSITION * far:
-        times = f"{reach / far:.0f} times the joint's limits"
-        yield f"{name}: positions reach {reach:.3g}, {times}; check the unit of the position"
 
 
 def is_even(t: Column, T_s: float) -> bool:

@@ -18,6 +18,7 @@ from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
+MAX_VALUE = 1e30  # of a sample in the unit of its channel; no quantity of an arm is larger, nor are times in ns
 HISTORY = 1 << 13  # samples before a jump of the clock in which the motion may have repeated
 
 # Channels of the log by the columns of a Touch; channels of joints become recordings.
@@ -205,8 +206,8 @@ class Intake:
         return value if joint.effort else value * ratio * joint.torque_constant
 
     def require_numbers(self, name: str, values: Column) -> None:
-        """Refuse a time that is missing or a sample that is infinite."""
-        bad = np.flatnonzero(~np.isfinite(values))
+        """Refuse a time that is missing, or a sample that is infinite or so large that its square would be."""
+        bad = np.flatnonzero(~(np.abs(values) < MAX_VALUE))
         if not len(bad):
             return
         row = self.rows + int(bad[0])

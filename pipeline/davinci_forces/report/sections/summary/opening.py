@@ -65,7 +65,7 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
 
 def as_list(parts: Sequence[str]) -> str:
     """Parts of a sentence as a list: 'a, b and c'."""
-    return " and ".join(", ".join(parts).rsplit(", ", 1))
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
 
 
 def measurements(context: Context) -> tuple[str, ...]:

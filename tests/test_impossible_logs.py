@@ -1,0 +1,199 @@
+"""Logs that no arm can have recorded: each ends in a refusal or a remark that names the fault, and none in a bug."""
+
+import math
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import davinci_forces
+from davinci_forces.errors import BadLog
+from davinci_forces.records import Diagnostic, Recording
+from davinci_forces.stages.recordings import resample
+from tests import arm
+from tests.guide.make_logs import URDF, measured, motion, sensed
+from tests.test_bad_logs import call_any
+from tests.test_new import table
+
+Columns = dict[str, np.ndarray]  # t (N,), and q, dq and tau (N, n)
+DEG = 180 / math.pi
+
+
+def scaled(**factors: float) -> Callable[[Columns], Columns]:
+    return lambda log: log | {name: log[name] * factor for name, factor in factors.items()}
+
+
+def constant(**values: float) -> Callable[[Columns], Columns]:
+    return lambda log: log | {name: np.full_like(log[name], value) for name, value in values.items()}
+
+
+def noise(**sizes: float) -> Callable[[Columns], Columns]:
+    def spoil(log: Columns) -> Columns:
+        rng = np.random.default_rng(5)
+        return log | {name: size * rng.normal(size=log[name].shape) for name, size in sizes.items()}
+
+    return spoil
+
+
+def first(change: Callable[[Columns], Columns]) -> Callable[[Columns], Columns]:
+    """Spoil the first joint alone."""
+
+    def spoil(log: Columns) -> Columns:
+        bad = change({name: column[:, :1] for name, column in log.items() if name != "t"} | {"t": log["t"]})
+        return log | {name: np.column_stack([bad[name], log[name][:, 1:]]) for name in ("q", "dq", "tau")}
+
+    return spoil
+
+
+def jump(size: float) -> Callable[[Columns], Columns]:
+    return lambda log: log | {"q": log["q"] + size * (np.arange(len(log["t"])) > len(log["t"]) // 2)[:, None]}
+
+
+def cut(rows: int) -> Callable[[Columns], Columns]:
+    return lambda log: {name: column[:rows] for name, column in log.items()}
+
+
+def alternating(log: Columns) -> Columns:
+    return log | {"q": (np.arange(len(log["t"])) % 2)[:, None] + 0.0 * log["q"]}
+
+
+LOGS: dict[str, Callable[[Columns], Columns]] = {
+    "positions in degrees": scaled(q=DEG),
+    "both in degrees": scaled(q=DEG, dq=DEG),
+    "a position of 1e200": scaled(q=1e200, dq=1e200),
+    "time in us": scaled(t=1e6),
+    "velocity in deg/s": scaled(dq=DEG),
+    "positions stand still": constant(q=0.3, dq=0.0),
+    "an effort of 1e200": scaled(tau=1e200),
+    "velocity in rad/s, stated in deg/s": scaled(dq=1 / DEG),
+    "positions x1000": scaled(q=1e3),
+    "positions x1e6": scaled(q=1e6),
+    "positions /1000": scaled(q=1e-3),
+    "positions /1e6": scaled(q=1e-6),
+    "both x1000": scaled(q=1e3, dq=1e3),
+    "both x1e6": scaled(q=1e6, dq=1e6),
+    "both tiny": scaled(q=1e-200, dq=1e-200),
+    "one joint in degrees": first(scaled(q=DEG, dq=DEG)),
+    "velocity x1e6": scaled(dq=1e6),
+    "velocity reversed": scaled(dq=-1.0),
+    "velocity 0": constant(dq=0.0),
+    "positions are noise": noise(q=1.0),
+    "positions are little noise": noise(q=1e-4),
+    "one position is noise": first(noise(q=1.0)),
+    "velocities are noise": noise(dq=10.0),
+    "all is noise": noise(q=1.0, dq=1.0, tau=1.0),
+    "efforts are noise": noise(tau=1.0),
+    "efforts are constant": constant(tau=3.0),
+    "efforts are 0": constant(tau=0.0),
+    "one effort is 0": first(constant(tau=0.0)),
+    "efforts x1e6": scaled(tau=1e6),
+    "efforts x1e-9": scaled(tau=1e-9),
+    "efforts reversed": scaled(tau=-1.0),
+    "an angle wraps": jump(2 * math.pi),
+    "a position jumps by 1e4": jump(1e4),
+    "one joint never moves": first(constant(q=0.3, dq=0.0)),
+    "time in ms": scaled(t=1e3),
+    "time x1e-3": scaled(t=1e-3),
+    "time x1e-6": scaled(t=1e-6),
+    "one row": cut(1),
+    "two rows": cut(2),
+    "five rows": cut(5),
+    "a fifth of a second": cut(20),
+    "a part of a period": cut(100),
+    "positions alternate": alternating,
+    "positions are steps": lambda log: log | {"q": np.sign(log["q"] - log["q"].mean(axis=0))},
+    "positions are ramps": lambda log: log | {"q": log["t"][:, None] + 0.0 * log["q"]},
+    "positions are efforts": lambda log: log | {"q": log["tau"]},
+    "efforts are positions": lambda log: log | {"tau": log["q"]},
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+@pytest.mark.parametrize("velocity", [True, False], ids=["limits and velocities", "neither"])
+def test_no_log_however_impossible_ends_in_a_bug(tmp_path, name, velocity):
+    """Identification, validation and contact are all spoilt, in an arm with or without limits and velocities."""
+    folder = tmp_path / "raw" / "bench"
+    folder.mkdir(parents=True)
+    free = re.sub('lower=.*velocity="3"', "", URDF).replace("revolute", "continuous")
+    (folder / "bench.urdf").write_text(URDF if velocity else free)
+    robot, joints = davinci_forces.robot("bench.urdf", folder), ("pan", "lift", "elbow")
+    symbols = ("q", "dq", "tau") if velocity else ("q", "tau")
+    text = 'title = "T"\nrobot = "bench.urdf"\n'
+    for seed, role in enumerate(("identification", "validation", "contact"), start=1):
+        t, q, dq, ddq = motion(seed, 3, 6.0, 1.5 + 0.2 * seed, 0.4)
+        tau = measured(robot.inverse_dynamics(q, dq, ddq), dq, seed, np.array([2.0, 2.0, 1.0]))
+        log = LOGS[name](dict(zip(("t", "q", "dq", "tau"), (t, *sensed(q, dq), tau), strict=True)))
+        names = [f"{joint}.{symbol}" for symbol in symbols for joint in joints]
+        table(folder / f"{role}.csv", log["t"], *(log[s] for s in symbols), header=",".join(["time", *names]))
+        text += f'[[log]]\nname = "{role}"\nfile = "{role}.csv"\nrole = "{role}"\n[log.channels]\ntime = "time"\n'
+        text += "".join(f'"{channel}" = "{channel}"\n' for channel in names)
+    (folder / "study.toml").write_text(text)
+    said = " ".join(call_any("stream", folder).split())
+    assert "a bug" not in said
+    assert "Traceback" not in said
+
+
+def resampled(change: Callable[[Columns], Columns], name="hand_roll", velocity="logged") -> list[str]:
+    """The warnings that `resample` makes of one spoilt joint of the tests' arm."""
+    s = arm.signal(name, rate=100.0, period=2.0, periods=5)
+    log = change({"t": s.t, "q": s.q[:, None], "dq": s.dq[:, None], "tau": s.tau[:, None]})
+    columns = {symbol: log[symbol][:, 0] for symbol in ("q", "dq", "tau")} | {"filled": np.zeros(len(log["t"]), int)}
+    recording = Recording("run", name, "identification", 100.0, velocity, t=log["t"], **columns)
+    records = list(resample.run(recording, arm.joint(name), lowpass=17.0))
+    remarks = [r for r in records if isinstance(r, Diagnostic)]
+    return [str(text) for r in remarks for severity, text in zip(r.severity, r.text, strict=True) if severity != "note"]
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "factor", "hint"),
+    [
+        (scaled(dq=DEG), "hand_roll", 57.3, 'is the velocity in deg/s? write unit = "deg/s"'),
+        (scaled(q=DEG), "hand_roll", 1 / 57.3, 'is the position in degrees? write unit = "deg"'),
+        (scaled(dq=30 / math.pi), "hand_roll", 9.55, 'is the velocity in rpm? write unit = "rpm"'),
+        (scaled(dq=1e3), "instrument_slide", 1e3, 'is the velocity in mm/s? write unit = "mm/s"'),
+        (scaled(q=1e3), "instrument_slide", 1e-3, 'is the position in mm? write unit = "mm"'),
+        (scaled(t=1e3), "hand_roll", 1e3, 'is the time in ms? write unit = "ms"'),
+        (scaled(dq=-1.0), "hand_roll", -1.0, "write sign = -1"),
+        (scaled(q=1e-4), "hand_roll", 1e4, "check the sign, unit and column of both"),  # so that it seems at rest
+        (constant(dq=0.0), "hand_roll", 0.0, "without the channel of the velocity, it is derived"),
+    ],
+)
+def test_a_velocity_that_contradicts_the_position_is_refused_with_the_factor_and_the_unit(change, name, factor, hint):
+    with pytest.raises(BadLog) as refused:
+        resampled(change, name)
+    text = str(refused.value)
+    assert text.startswith(f"run/{name}: the logged velocity is ")
+    assert hint in text
+    stated = float(re.findall("velocity is ([-+.e0-9]+) times", text)[0])
+    assert_allclose(stated, factor, rtol=0.02, atol=1e-9)
+
+
+def test_a_velocity_that_is_somewhat_wrong_is_remarked_on_and_a_right_one_is_not():
+    assert resampled(lambda log: log) == []
+    (text,) = resampled(scaled(dq=1.3))
+    assert "the logged velocity is 1.3 times" in text
+
+
+def test_one_jump_of_a_position_neither_hides_nor_feigns_a_wrong_velocity():
+    (text,) = resampled(jump(0.9))
+    assert "the position jumps by 0.9" in text
+    assert "within one sample at 5.000 s" in text
+
+
+def test_motion_beyond_the_limits_of_a_joint_is_remarked_on_and_far_beyond_them_refused():
+    assert resampled(scaled(q=1.5, dq=1.5)) == []
+    (text,) = resampled(scaled(q=4.0, dq=4.0))
+    assert re.match(r"run/hand_roll: velocities reach .* rad/s, 2\.\d+ times the limit of 1.2 rad/s; are they", text)
+    with pytest.raises(BadLog) as refused:
+        resampled(scaled(q=DEG), velocity="derived")
+    assert re.search(r"positions reach .* rad, .* times the limit of 0\.6 rad, and velocities", str(refused.value))
+    assert 'are they in degrees or counts? write the unit of the channel in study.toml, as unit = "deg"' in str(
+        refused.value
+    )
+
+
+def test_an_effort_that_never_changes_is_named_with_its_value():
+    (text,) = resampled(constant(tau=0.0))
+    assert text == "run/hand_roll: the effort is 0 throughout; check the column of its channel"
