@@ -301,9 +301,11 @@ SLOW: dict[str, dict[str, int]] = {
 # Files that take longest: they come first, so that no process ends long before the others, and no two that make the
 # same study are next to each other.
 FIRST = (
-    "simulation/test_excitation_limits.py", "contracts/test_sections.py", "test_runs.py", "test_robustness.py",
-    "simulation/test_closed_loop.py", "test_period.py", "contracts/test_estimators.py", "report/test_campaign.py",
-    "test_faults.py", "test_consistent.py", "guide/test_tutorials.py", "test_real_data.py", "test_parameter_errors.py",
+    "guide/test_tutorials.py", "logs/test_ros_cut.py", "test_shipped_studies.py", "test_runs.py", "test_cluster.py",
+    "simulation/test_excitation_limits.py", "test_real_data.py", "logs/test_bag_study.py", "test_ekf.py",
+    "contracts/test_sections.py", "logs/test_damage.py", "simulation/test_excitation.py", "test_robustness.py",
+    "robot/test_kernels.py", "simulation/test_closed_loop.py", "test_period.py", "contracts/test_estimators.py",
+    "report/test_campaign.py", "test_faults.py", "test_consistent.py", "test_parameter_errors.py",
 )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import lag_error, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
+from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
@@ -37,10 +38,19 @@ def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2), finer=20):
     for k in range(len(tau)):
         rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
         pushed = noise.q_dq / T_S * rng.normal()  # an acceleration that is constant over the sample
-        for _ in range(finer):
-            half = dq + 0.5 * h * ((tau[k] - bias(c, q, dq, 0.0)[0] - tau_ext[k]) / M + pushed)
-            q, dq = q + h * half, dq + h * ((tau[k] - bias(c, q, half, 0.0)[0] - tau_ext[k]) / M + pushed)
+        q, dq = move(c, M, float(q), float(dq), tau[k] - tau_ext[k], pushed, h, finer)
     return np.array(rows).T
+
+
+compiled_bias = compile_function(bias)
+
+
+@compile_function
+def move(c, M, q, dq, driven, pushed, h, steps):
+    for _ in range(steps):
+        half = dq + 0.5 * h * ((driven - compiled_bias(c, q, dq, 0.0)[0]) / M + pushed)
+        q, dq = q + h * half, dq + h * ((driven - compiled_bias(c, q, half, 0.0)[0]) / M + pushed)
+    return q, dq
 
 
 def recorded(used, theta, y, tau, initial_std=1.0) -> FilterInput:

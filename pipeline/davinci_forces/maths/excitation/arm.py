@@ -212,7 +212,7 @@ def _lagrangian(
     stage: Stage, z: Array, mu: float, multipliers: list[Array] | None, width: Array
 ) -> tuple[float, Array, list[Array]]:
     """The augmented Lagrangian, its gradient by z, and the next multipliers."""
-    problem, x = stage.problem, stage.coefficients(z)
+    problem, limits, x = stage.problem, stage.problem.limits, stage.coefficients(z)
     q, dq, ddq = stage.motion(x)
     Y = compiled_regressor(problem.chain, q, dq, ddq)
     F = _columns(Y, dq, ddq, problem.columns, width)
@@ -220,20 +220,23 @@ def _lagrangian(
     if not np.isfinite(dF).all():
         return HUGE, np.zeros_like(z), multipliers or []
     before = multipliers or [np.zeros(1)] * (1 + len(x))
-    after = [mu * np.maximum(0.0, problem.limits.excess(q, Y) + before[0] / mu)]
+    after = [mu * np.maximum(0.0, limits.excess(q, Y) + before[0] / mu)]
     weights = np.zeros((*q.shape, Y.shape[-1] + 3 * len(x)))  # of all columns, as dF is of the base columns
     weights[..., problem.columns] = dF.reshape(F.shape)
-    of_links = weights[..., : Y.shape[-1]]
-    of_joints = np.einsum("kjcj->ckj", weights[..., Y.shape[-1] :].reshape(*q.shape, 3, len(x)))
+    of_links, of_joints = np.split(weights, [Y.shape[-1]], axis=-1)
+    of_joints = np.einsum("kjcj->ckj", of_joints.reshape(*q.shape, 3, len(x)))
+    of_efforts, of_depths = np.split(after[0], [2 * len(x) * limits.limits_effort], axis=-1)
+    if limits.parameters is not None and limits.limits_effort:
+        above, below = np.split(of_efforts / np.tile(limits.efforts, 2), 2, axis=-1)
+        of_links += (above - below)[..., None] * limits.parameters  # efforts are linear in the regressor
 
     def of_sample(q: Array, dq: Array, ddq: Array) -> Array:
-        Y = compiled_regressor(problem.chain, q, dq, ddq)
-        c = problem.limits.excess(q, Y)
-        added = of_joints[0] * ddq + of_joints[1] * dq + of_joints[2] * np.tanh(dq / width)
-        penalty = mu / 2 * (np.maximum(0.0, c + before[0] / mu) ** 2).sum(axis=-1)
-        return np.asarray(np.einsum("...kjc,kjc->...k", Y, of_links) + added.sum(axis=-1) + penalty)
+        return np.asarray(np.einsum("...kjc,kjc->...k", compiled_regressor(problem.chain, q, dq, ddq), of_links))
 
-    slopes, gradient = _slopes(of_sample, (q, dq, ddq)), []
+    slopes, gradient = _slopes(of_sample, [q, dq, ddq]), []
+    slopes[0] += _slopes(lambda q: np.asarray((limits.depth(q) * of_depths).sum(axis=-1)), [q])[0]
+    slopes[1] += of_joints[1] + of_joints[2] * (1 - np.tanh(dq / width) ** 2) / width
+    slopes[2] += of_joints[0]
     for i, (joint, B, Q) in enumerate(zip(problem.joints, stage.bases, stage.limit_bases, strict=True)):
         c, dc = _joint_excess(joint, Q, x[i])
         after.append(mu * np.maximum(0.0, c + before[1 + i] / mu))
@@ -242,15 +245,14 @@ def _lagrangian(
     return value, np.concatenate([s * part for s, part in zip(stage.scale, gradient, strict=True)]), after
 
 
-def _slopes(function: Callable[[Array, Array, Array], Array], motion: Sequence[Array]) -> list[Array]:
-    """Derivatives (K, n) of a function (K,) of each sample of a motion by q, dq and ddq (K, n)."""
+def _slopes(function: Callable[..., Array], motion: Sequence[Array]) -> list[Array]:
+    """Derivatives (K, n) of a function (K,) of each sample of a motion by each part (K, n) of it."""
     slopes = [np.empty_like(part) for part in motion]
     for i, slope in enumerate(slopes):
         for j in range(slope.shape[1]):
             both = [np.stack([part, part]) for part in motion]
             both[i][:, :, j] += np.array([[STEP], [-STEP]])
-            ahead, behind = function(both[0], both[1], both[2])
-            slope[:, j] = (ahead - behind) / (2 * STEP)
+            slope[:, j] = np.subtract(*function(*both)) / (2 * STEP)
     return slopes
 
 

@@ -17,7 +17,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
 from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.kinematics import frames
+from davinci_forces.maths.mechanics.kinematics import frames, poses_of_bodies
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
 INSTANTS = 10_000  # of a period at which the excess is computed; between them it is bounded
@@ -69,14 +69,18 @@ class ArmLimits:
 
     def excess(self, q: Array, Y: Array) -> Array:
         """The excess (..., m) over each limit at q (..., n) with regressor Y (..., n, 10 L); m = 0 without limits."""
-        parts = [np.empty((*q.shape[:-1], 0))]
+        share = np.empty((*q.shape[:-1], 0))
         if self.parameters is not None and self.limits_effort:
             share = Y @ self.parameters / np.array(self.efforts)
-            parts += [share - 1, -share - 1]
-        if self.obstacles.present:
-            points = frames(self.chain, q)[..., :3, 3][..., self._moving, :]
-            parts += [self.obstacles.depth(points).reshape(*q.shape[:-1], -1)]
-        return np.concatenate(parts, axis=-1)
+        return np.concatenate([share - 1, -share - 1, self.depth(q)], axis=-1)
+
+    def depth(self, q: Array) -> Array:
+        """The depth (..., d) [m] of each moving frame in each obstacle at q (..., n): the last part of the excess."""
+        if not self.obstacles.present:
+            return np.empty((*q.shape[:-1], 0))
+        poses, offset = poses_of_bodies(self.chain, q), self.chain.offset[self._moving, :, 3]
+        points = np.einsum("...fij,fj->...fi", poses[..., self.chain.body[self._moving], :3, :], offset)
+        return self.obstacles.depth(points).reshape(*q.shape[:-1], -1)
 
     def hold(self, q: Array, dq: Array, ddq: Array) -> bool:
         """Whether the limits hold along a motion (K, n), also between its samples.
@@ -95,13 +99,12 @@ class ArmLimits:
 
 def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[Fourier] | None:
     """Shrink all series towards rest at their means until the limits hold at every instant; None if rest breaks one."""
-
-    def shrunk(scale: float) -> list[Fourier]:
-        return [Fourier.from_coefficients(np.r_[s.a0, scale * s.x[1:]], s.period) for s in series]
+    t = np.linspace(0.0, series[0].period, INSTANTS + 1)
+    q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in series), strict=True))
+    rest = np.array([s.a0 for s in series])
 
     def hold_at(scale: float) -> bool:
-        t = np.linspace(0.0, series[0].period, INSTANTS + 1)
-        return limits.hold(*(np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in shrunk(scale)), strict=True)))
+        return limits.hold(rest + scale * (q - rest), scale * dq, scale * ddq)
 
     if not limits.present or hold_at(1.0):
         return list(series)
@@ -109,4 +112,4 @@ def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list
     for _ in range(SHRINKAGES):
         middle = (low + high) / 2
         low, high = (middle, high) if hold_at(middle) else (low, middle)
-    return shrunk(low) if low > 0 else None
+    return [Fourier.from_coefficients(np.r_[s.a0, low * s.x[1:]], s.period) for s in series] if low > 0 else None

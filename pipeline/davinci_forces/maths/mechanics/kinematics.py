@@ -21,18 +21,20 @@ def frames(chain: Chain, q: ArrayLike) -> Array:
 
 def poses_of_bodies(chain: Chain, q: Array) -> Array:
     """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
-    chain = chain.with_coordinates(q.shape[-1])
-    moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
-    turned = np.where(chain.slides, 0.0, moved)[..., None]
-    c, s = np.cos(turned), np.sin(turned)
-    x, y, z, position = np.moveaxis(chain.placement, -1, 0)
-    origin = position + np.where(chain.slides, moved, 0.0)[..., None] * z
-    local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, origin.shape), origin], axis=-1)
-    T = np.empty((*q.shape[:-1], len(chain.parent) + 1, 4, 4))
-    T[..., 0, :, :] = np.eye(4)
-    for i, parent in enumerate(chain.parent):
-        T[..., i + 1, :, :] = T[..., parent, :, :] @ local[..., i, :, :]
-    return T
+    chain, samples = chain.with_coordinates(q.shape[-1]), q.reshape(-1, q.shape[-1]).T
+    c, s = np.cos(samples), np.sin(samples)
+    T = np.empty((len(chain.parent) + 1, 4, 3, samples.shape[1]))  # columns; samples last, for vector instructions
+    T[0] = np.eye(4, 3)[..., None]
+    for i, (parent, k) in enumerate(zip(chain.parent, chain.coordinate, strict=True)):
+        x, y, z, origin = T[i + 1]
+        T[i + 1] = np.einsum("ba,bcs->acs", chain.placement[i], T[parent])
+        if k != FIXED and chain.slides[i]:
+            origin += samples[k] * z
+        elif k != FIXED:
+            T[i + 1, :2] = c[k] * x + s[k] * y, c[k] * y - s[k] * x
+    poses = np.zeros((samples.shape[1], len(T), 4, 4))
+    poses[:, :, :3], poses[:, :, 3, 3] = T.transpose(3, 0, 2, 1), 1.0
+    return poses.reshape(*q.shape[:-1], len(T), 4, 4)
 
 
 def tip(chain: Chain, q: ArrayLike) -> Array:
