@@ -101,11 +101,12 @@ def declaration(step: str) -> Declaration:
 def _signature(step: str) -> tuple[tuple[str, ...], dict[str, Any]]:
     """The settings that a step takes, and the types of its parameters and of what it returns.
 
-    They are read from the text of its module, too.
+    They are read from the text of its module, too, of which only the signature is parsed.
     """
     stage, _, name = step.partition(".")
-    body = ast.parse(_source(stage)).body
-    function = next(node for node in body if isinstance(node, ast.FunctionDef) and node.name == (name or "run"))
+    signature = re.search(rf"^def {name or 'run'}\(.*?:$", _source(stage), re.MULTILINE | re.DOTALL)
+    [function] = ast.parse(f"{signature and signature[0]} ...").body
+    assert isinstance(function, ast.FunctionDef)
     settings = tuple(argument.arg for argument in function.args.kwonlyargs)
     if unknown := sorted(set(settings) - set(SETTINGS)):
         raise TypeError(f"{step} takes settings that do not exist: {', '.join(unknown)}")

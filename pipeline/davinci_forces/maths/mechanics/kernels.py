@@ -38,14 +38,20 @@ def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
 
 
 @compile_and_store
-def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bias: Any) -> None:
-    """Put M(q) (n, n) and the effort (n,) of one sample into arrays; with ddq 0 this is C dq + G.  (4.41)"""
-    n, L, samples = tree.n, len(tree.parent), range(1)
-    joints = np.zeros((n + 1, 5, 1))
-    load(q.reshape(1, n), dq.reshape(1, n), ddq.reshape(1, n), joints)
-    work = np.zeros((L + 1, 15, 1))
-    recursions.inverse_dynamics(tree, gravity, joints, work, bias.reshape(n, 1), samples)
-    recursions.mass_matrix(tree, joints, work, M.reshape(n, n, 1), samples)
+def mass_and_bias(tree: Any, gravity: float, q: Any, dq: Any, ddq: Any, M: Any, bias: Any) -> None:
+    """Put M(q) (n, n) and the effort (n,) of one sample into arrays; with ddq 0 this is C dq + G.  (4.41)
+
+    Column c of M is the effort of a unit acceleration at rest without gravity, since one recursion compiles faster.
+    """
+    n, effort = tree.n, bias.reshape(tree.n, 1)
+    joints, work = np.zeros((n + 1, 5, 1)), np.zeros((len(tree.parent) + 1, 15, 1))
+    for c in range(n + 1):  # the last one is the bias
+        for k in range(n):
+            joints[k, 0, 0], joints[k, 1, 0], joints[k, 2, 0] = cos(q[k]), sin(q[k]), q[k]
+            joints[k, 3, 0], joints[k, 4, 0] = (0.0, 1.0 if k == c else 0.0) if c < n else (dq[k], ddq[k])
+        recursions.inverse_dynamics(tree, gravity if c == n else 0.0, joints, work, effort, range(1))
+        for k in range(c + 1 if c < n else 0):  # a distal link's effort at earlier joints has the fewest lost digits
+            M[k, c] = M[c, k] = bias[k]
 
 
 @compile_and_store

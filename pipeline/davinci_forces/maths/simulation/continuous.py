@@ -51,8 +51,16 @@ def regulate(
         tau = effort(q, dq, integral)
         return np.concatenate([dq, np.linalg.solve(M + inertia, tau - b - viscous * dq), target - q])
 
+    def jacobian(_: float, state: Array) -> Array:
+        """d slope / d state (3 n, 3 n) without the small change of M and b; differences would be rounding at rest."""
+        effort(*state.reshape(3, n))
+        gains = (-law.proportional, -law.derivative - viscous, law.integral)
+        accelerations = np.linalg.solve(M + inertia, np.hstack([np.diag(gain) for gain in gains]))
+        zero, one = np.zeros((n, n)), np.eye(n)
+        return np.block([[zero, one, zero], [accelerations], [-one, zero, zero]])
+
     start, inertia = np.concatenate([q, np.zeros(2 * n)]), np.diag(plant.data.rotors)
-    solution = solve_ivp(slope, (0.0, duration), start, method="Radau", rtol=RELATIVE, atol=ABSOLUTE)
+    solution = solve_ivp(slope, (0.0, duration), start, method="Radau", jac=jacobian, rtol=RELATIVE, atol=ABSOLUTE)
     if not solution.success:
         raise ArithmeticError(f"the solver stopped at {solution.t[-1]:g} s: {solution.message}")
     states = solution.y.T.reshape(-1, 3, n).copy()

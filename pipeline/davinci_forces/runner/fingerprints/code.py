@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache
+from os import sep
 from pathlib import Path
 
 from davinci_forces.files import digest
@@ -33,7 +34,7 @@ def code(*modules: str, without: str = "") -> dict[str, str]:
         _collect(_files(module), files)
     named = {file for module in modules for file in _files(module)}
     left_out = PACKAGE.joinpath(*without.split(".")[1:]) if without else None
-    hashed = (file for file in sorted(files) if file in named or left_out not in file.parents)
+    hashed = (file for file in sorted(files, key=str) if file in named or not str(file).startswith(f"{left_out}{sep}"))
     return {file.relative_to(PACKAGE).as_posix(): _hash_of(file) for file in hashed}
 
 
@@ -41,19 +42,15 @@ def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
     for file in sources:
         if file not in files:
             files[file] = None
-            if file.suffix == ".py":
-                for module in _imports(file):
-                    _collect(_files(module), files)
+            _collect(_imports(file), files)
 
 
 @cache
-def _imports(file: Path) -> tuple[str, ...]:
-    modules = []
-    for module, names in find_imports(file.read_text(encoding="utf-8")):
-        for name in names:
-            deeper = f"{module}.{name}"
-            modules.append(deeper if _files(deeper) else module)
-    return tuple(modules)
+def _imports(file: Path) -> tuple[Path, ...]:
+    if file.suffix != ".py":
+        return ()
+    imports = find_imports(file.read_text(encoding="utf-8"))
+    return tuple(file for module, names in imports for n in names for file in _files(f"{module}.{n}") or _files(module))
 
 
 def find_imports(source: str) -> Iterator[tuple[str, list[str]]]:
