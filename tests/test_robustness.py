@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from davinci_forces.errors import BadRequest
+from davinci_forces.errors import BadLog, BadRequest
 from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
 from davinci_forces.robots import davinci
 from davinci_forces.runner import execution
@@ -567,26 +567,30 @@ def rest(columns):
     columns["dq"][500:600] = 0.0
 
 
-def test_a_stuck_sensor_a_saturated_drive_and_a_wrong_unit_are_said():
+def test_a_stuck_sensor_and_a_saturated_drive_are_said():
     assert remarked(lambda columns: None) == ""
     assert "stands still from 5.000 to 5.990 s and then jumps" in remarked(stop_sensor)
     assert "the position stands still" not in remarked(rest)
     limit = np.quantile(arm.signal("hand_roll", rate=100.0, periods=2).tau, 0.9)
     assert "was saturated" in remarked(lambda c: c.update(tau=np.minimum(c["tau"], limit)))
-    in_mrad = remarked(lambda c: c.update(q=1000.0 * c["q"], dq=1000.0 * c["dq"]))
-    assert "check the unit of the position" in in_mrad
 
 
-def test_positions_beyond_twenty_times_the_limits_are_in_another_unit():
+def test_positions_beyond_twice_the_limits_are_remarked_on_and_beyond_twenty_times_refused():
     far = np.quantile(np.abs(arm.signal("hand_roll", rate=100.0, periods=2).q), 0.99) / 0.6
-    for times, is_said in ((19.0, False), (21.0, True)):
-        said = remarked(lambda c, by=times / far: c.update(q=by * c["q"], dq=by * c["dq"]))
-        assert ("check the unit of the position" in said) == is_said
+
+    def at(times):
+        return remarked(lambda c: c.update(q=times / far * c["q"], dq=times / far * c["dq"]))
+
+    assert at(1.9) == ""
+    for times in (2.1, 19.0):
+        assert "times the limit of 0.6 rad" in at(times)
+    with pytest.raises(BadLog, match=r"times the limit of 0\.6 rad.*write the unit of the channel"):
+        at(21.0)
 
 
 @pytest.mark.slow
 def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
-    """A log whose velocity is in other units than it says is remarked on, and the rest comes out as without it."""
+    """A log whose position is in other units than it says is refused, and the rest comes out as without it."""
     alone, beside = small(raw / "alone", ("one", "two")), small(raw / "beside", ("one", "two"))
     wrong = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5, seed=3)
     object.__setattr__(wrong, "q", 1000.0 * wrong.q)
@@ -594,8 +598,8 @@ def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
     with (beside / "study.toml").open("a") as study:
         study.write(arm.log_table("wrong", "wrong.csv", "validation", ["hand_roll"]))
     call("all", alone)
-    said = flat(call("all", beside))
-    assert "wrong/hand_roll: positions reach" in said
+    said = flat(call("all", beside, code=1))
+    assert "wrong/hand_roll: the logged velocity is 0.001 times the derivative of the logged position" in said
     theirs, ours = (json.loads((reports(folder) / "results.json").read_text()) for folder in (alone, beside))
     values = {row["key"]: row["value"] for row in ours}
     tracked = [row for row in theirs if row["key"].startswith(("fit.", "ekf."))]
