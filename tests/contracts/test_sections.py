@@ -212,6 +212,14 @@ def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, ca
     assert verdicts(replace(full, catalogue=with_remark)) == [("info", "1 of 2 logs were read without a remark.")]
 
 
+def test_why_logs_have_no_force_at_the_tip_is_stated_also_where_no_log_has_one(full: Context, catalogue: Catalogue):
+    remark = diagnostic("resolve", "push", "note", "push: no force at the tip: it has 4 joints")
+    records = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
+    blocks = [*runs.recording_blocks(replace(full, catalogue=records), full.catalogue.records(LogSummary))]
+    stated = [block.blocks for block in blocks if isinstance(block, OnScreen) and block.anchor == "tip-left-out"]
+    assert [items.items for [items] in stated if isinstance(items, Bullets)] == [(remark.text[0],)]
+
+
 def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_calls_for_no_caution(full: Context):
     def fits(std: float) -> list[Fit]:
         fit = full.own_fits()[0]
