@@ -283,10 +283,8 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
     timing = timing_of(log, samples, pairs, unnamed)
     joints = sorted(q)
     by_motor = {meaning.joint for meaning in holding.meanings.values() if meaning.symbol == "theta_m"}
-    sides = [sorted(q.keys() - by_motor), sorted(q.keys() & by_motor)]  # a motor turns farther than a joint at rest
-    moving = tuple(
-        sorted(k for side in sides for i in columns.moving_positions([q[k] for k in side]) for k in [side[i]])
-    )
+    sides = [[k for k in joints if (k in by_motor) is side] for side in (False, True)]  # a motor turns farther
+    moving = tuple(sorted(side[i] for side in sides for i in columns.moving_positions([q[k] for k in side])))
     again = repetition([q[joint] for joint in moving]) if len({len(q[joint]) for joint in moving}) == 1 else None
     velocity = dq.get(moving[0], np.gradient(q[moving[0]])) if len(moving) == 1 else None
     step = timing.step or 1.0
