@@ -266,7 +266,7 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     assert said == (
         "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
         "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
-        "slide, too much to be believed; all 95 % bands are wide enough."
+        "slide, too much to be believed; in free motion all 95 % bands are wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
