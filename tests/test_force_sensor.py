@@ -144,6 +144,7 @@ def test_a_log_with_a_sensor_and_nothing_to_compare_says_so():
     [said] = sensed(touch(PUSH))
     assert isinstance(said, Diagnostic)
     assert "its force sensor is not compared with an estimate" in said.text[0]
+    assert said.severity.tolist() == ["warning"]  # so the terminal and page one show it
     at_rest = tracks(ROBOT, np.zeros((len(T), 3)), at_rest=(1, 1, 1))
     assert isinstance(sensed(touch(PUSH), [], at_rest)[0], Diagnostic)
 

@@ -195,8 +195,9 @@ def test_motion_beyond_the_limits_of_a_joint_is_remarked_on_and_far_beyond_them_
     with pytest.raises(BadLog) as refused:
         resampled(scaled(q=DEG), velocity="derived")
     assert re.search(r"positions reach .* rad, .* times the limit of 0\.6 rad, and velocities", str(refused.value))
-    assert 'are they in degrees or counts? write the unit of the channel in study.toml, as unit = "deg"' in str(
-        refused.value
+    assert (
+        'are they in degrees or counts? write the unit of the channel in study.toml, as unit = "deg", or the gear_ratio'
+        in str(refused.value)
     )
 
 

@@ -212,6 +212,14 @@ def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, ca
     assert verdicts(replace(full, catalogue=with_remark)) == [("info", "1 of 2 logs were read without a remark.")]
 
 
+def test_why_logs_have_no_force_at_the_tip_is_stated_also_where_no_log_has_one(full: Context, catalogue: Catalogue):
+    remark = diagnostic("resolve", "push", "note", "push: no force at the tip: it has 4 joints")
+    records = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
+    blocks = [*runs.recording_blocks(replace(full, catalogue=records), full.catalogue.records(LogSummary))]
+    stated = [block.blocks for block in blocks if isinstance(block, OnScreen) and block.anchor == "tip-left-out"]
+    assert [items.items for [items] in stated if isinstance(items, Bullets)] == [(remark.text[0],)]
+
+
 def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_calls_for_no_caution(full: Context):
     def fits(std: float) -> list[Fit]:
         fit = full.own_fits()[0]
@@ -258,7 +266,7 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     assert said == (
         "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
         "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
-        "slide, too much to be believed; all 95 % bands are wide enough."
+        "slide, too much to be believed; in free motion all 95 % bands are wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))

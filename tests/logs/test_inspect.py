@@ -53,6 +53,14 @@ def test_json_holds_the_same_and_no_nan(log: Path) -> None:
     assert (found["channels"][1]["nans"], found["channels"][2]["nulls"]) == (1, 1)
 
 
+def test_the_clock_is_in_seconds_whatever_unit_the_name_of_its_channel_states(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time_ms,q\n" + "".join(f"{1000 + 4 * k},{k % 7}\n" for k in range(101)))
+    found = json.loads(shown(path, "--json"))
+    assert_allclose([found["clock"][key] for key in ("rate", "duration", "longest_gap")], [250.0, 0.4, 0.004])
+    assert found["channels"][0]["most"] == 1400.0
+
+
 def test_repeated_rows_are_flagged_from_a_tenth_on(tmp_path: Path) -> None:
     t = np.arange(100) * 0.01
     q = np.arange(100.0)

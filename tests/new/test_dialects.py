@@ -4,6 +4,7 @@ Right is what `ingest` then reads: positions, velocities and efforts of every jo
 numbers that were written, and not only the text of study.toml.
 """
 
+import re
 from collections.abc import Callable
 from itertools import product
 
@@ -355,6 +356,39 @@ def test_the_robot_beside_the_logs_is_taken_though_no_column_has_the_names_of_it
         zip(quantities, columns, strict=True)
     )
     assert text.count(doubt) >= (9 if doubt else 0)
+
+
+def driven(folder, header, gear=50.0):
+    """The log of a bench of which the second joint is measured at its motor, by position, velocity and current."""
+    bench(folder, "t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3")
+    table = np.genfromtxt(folder / "run.csv", delimiter=",", skip_header=1)
+    table[:, 1:7] *= 180.0 / np.pi
+    table[:, [2, 5]] *= gear
+    np.savetxt(folder / "run.csv", table, delimiter=",", header=header, comments="")
+    return folder
+
+
+def test_one_joint_at_its_motor_leaves_the_others_at_the_joint_and_in_newton_metres(tmp_path):
+    header = (
+        "t,j1_pos_deg,j2_motor_pos_deg,j3_pos_deg,j1_vel,j2_motor_vel,j3_vel,j1_torque_Nm,j2_current_A,j3_torque_Nm"
+    )
+    call("new", driven(tmp_path, header))
+    [entry] = reading.read(tmp_path).logs
+    quantities = {s.channel: s.quantity for s in entry.channels}
+    assert {quantities[name] for name in ("j2_motor_pos_deg", "j2_motor_vel", "j2_current_A")} == {
+        "lift.theta_m", "lift.dtheta_m", "lift.i"
+    }  # fmt: skip
+    assert [quantities[f"j{k}_torque_Nm"] for k in (1, 3)] == ["pan.tau", "elbow.tau"]
+    text = (tmp_path / "study.toml").read_text()
+    assert '"lift.dtheta_m" = { channel = "j2_motor_vel", unit = "deg/s" }' in text
+    assert re.findall(r"\[robot_overrides\.(.*)\]", text) == ["lift"]
+
+
+def test_a_current_without_a_position_is_not_called_a_joint_at_rest(tmp_path):
+    header = "t,j1_pos_deg,x,j3_pos_deg,j1_vel,y,j3_vel,j1_torque_Nm,j2_current_A,j3_torque_Nm"
+    table = call("new", driven(tmp_path, header))
+    assert "no position of lift" in " ".join(table.split())
+    assert '# "lift.i" = "j2_current_A"  # CHECK: no position of the joint' in (tmp_path / "study.toml").read_text()
 
 
 @pytest.mark.parametrize(

@@ -220,6 +220,6 @@ def test_a_numbered_joint_has_no_article_in_a_sentence():
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
     assert "all 95 % bands are wide enough" not in verdict_sentence(None, [unjudged])
-    assert "all 95 % bands are wide enough" in verdict_sentence(
+    assert "in free motion all 95 % bands are wide enough" in verdict_sentence(
         None, [replace(unjudged, space=free_space(coverage=0.95))]
     )

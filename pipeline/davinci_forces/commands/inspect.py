@@ -96,7 +96,10 @@ def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
 
     from davinci_forces.maths.signals.clock import ClockStatistics
     from davinci_forces.maths.signals.columns import Outline
+    from davinci_forces.maths.units import measures, size
 
+    unit = next((channel.unit for channel in log.channels if channel.name == source), "")
+    seconds = size(unit) if measures(unit) == "time" else 1.0
     kinds = {channel.name: channel.kind for channel in log.channels if not channel.derived}
     measured = [name for name in names if kinds.get(name) == "number" and name != source]
     survey = _Survey(ClockStatistics(), {name: Outline() for name in names}, {name: [] for name in names})
@@ -104,7 +107,7 @@ def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
         count = len(next(iter(block.values())))
         number = survey.rows + np.arange(count, dtype=float)  # counts samples where the log has no clock
         t = block.get(source, log.clock.start + number * log.clock.step if log.clock else number)
-        survey.statistics.update(t, [block[name] for name in measured])
+        survey.statistics.update(seconds * t, [block[name] for name in measured])
         for name in names:
             survey.outlines[name].update(block[name])
             survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())

@@ -26,6 +26,7 @@ ORDER = 3  # of the polynomial through the samples of a window
 GAP = 1.5  # sampling times; a longer wait restarts the filter
 STILL = 3.0  # standard deviations of the velocity's noise, below which a joint stands still
 DOUBTFUL = 0.67  # likewise, below which the sign of the velocity is that of its noise
+YZX, ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 SINGULAR = 1e4  # condition number of the Jacobian, above which the efforts do not determine a force
 Z_OF_MOTION: dict[str, Callable[[float, float], float]] = {
     "|dq|": lambda q, dq: abs(dq),
@@ -148,7 +149,7 @@ class LinkTree:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
+    return np.asarray(a.take(YZX, -1) * b.take(ZXY, -1) - a.take(ZXY, -1) * b.take(YZX, -1))
 
 
 def _carried(w: Array, e: Array, r: Array) -> Array:

@@ -99,7 +99,8 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
     text = f"its own terms explain {percent(max(r2, 0.0))} of the effort's variance"
     if others:
         move = f"{join_names(others)} move{'s' if len(others) == 1 else ''}"
-        return f"{text}: {move} in the same logs, which its terms omit; record the joint by itself"
+        remedy = "record the joint by itself, unless a model of the whole arm is chosen for it"
+        return f"{text}: {move} in the same logs, which its terms omit; {remedy}"
     return f"{text}: check that its effort and motion are channels of one joint, and which terms its model needs"
 
 

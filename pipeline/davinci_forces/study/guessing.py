@@ -28,6 +28,7 @@ from davinci_forces.study.names import (
 from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
+AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
 POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i")
 
 
@@ -168,7 +169,7 @@ def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> 
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
     unit = measures(canonical(channel.unit))
     motor = "motor" in words or (unit == "angle" and joint.kind is Kind.PRISMATIC)
-    return {"q": "theta_m", "dq": "dtheta_m"}.get(symbol, symbol) if motor else symbol
+    return AT_MOTOR.get(symbol, symbol) if motor else symbol
 
 
 def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
@@ -181,7 +182,9 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     """Assign joints by the number or label of a channel among those of one name: `q1`, `effort[outer_yaw]`."""
     groups: dict[str, Numbered] = {}
     for group in joint_groups(channels):
-        groups.setdefault(group.symbol, group)
+        first_group = groups.setdefault(group.symbol, group)
+        if "motor" in group.words:  # of joints that are measured there alone
+            groups[group.symbol] = replace(first_group, names=group.names | first_group.names)
     if "q" not in groups or not groups.keys() & {"tau", "i"}:
         return Holding()
     labels = [*groups["q"].names]
@@ -198,7 +201,8 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
             else:
                 continue
             unit = "" if units[name] else _usual(symbol, group.words)
-            meanings[name] = Meaning(symbol, joint, reason, unit)
+            motor = AT_MOTOR.get(symbol, symbol) if "motor" in words_of(name) else symbol
+            meanings[name] = Meaning(motor, joint, reason, unit)
     meanings = _with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
@@ -278,7 +282,9 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
     pairs = [(q[joint], dq[joint]) for joint in q if joint in dq and len(dq[joint]) == len(q[joint])]
     timing = timing_of(log, samples, pairs, unnamed)
     joints = sorted(q)
-    moving = tuple(joints[i] for i in columns.moving_positions([q[joint] for joint in joints]))
+    by_motor = {meaning.joint for meaning in holding.meanings.values() if meaning.symbol == "theta_m"}
+    sides = [[k for k in joints if (k in by_motor) is side] for side in (False, True)]  # a motor turns farther
+    moving = tuple(sorted(side[i] for side in sides for i in columns.moving_positions([q[k] for k in side])))
     again = repetition([q[joint] for joint in moving]) if len({len(q[joint]) for joint in moving}) == 1 else None
     velocity = dq.get(moving[0], np.gradient(q[moving[0]])) if len(moving) == 1 else None
     step = timing.step or 1.0
@@ -287,9 +293,10 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
         for joint in moving
         if joint in tau and len(tau[joint]) == len(q[joint]) == len(dq.get(joint, q[joint]))
     }
+    by_slope = {s: unit for symbol, unit in timing.units for s in (symbol, AT_MOTOR[symbol])}
     meanings = {
-        name: replace(m, unit=dict(timing.units)[m.symbol], reason=f"{m.reason}; unit by velocity over slope")
-        if m.symbol in dict(timing.units) and not m.unit and not units.get(name) else m
+        name: replace(m, unit=by_slope[m.symbol], reason=f"{m.reason}; unit by velocity over slope")
+        if m.symbol in by_slope and not m.unit and not units.get(name) else m
         for name, m in holding.meanings.items()
     }  # fmt: skip
     return replace(

@@ -206,13 +206,14 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "[settings]  # every key has a default; the report lists the values used"
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
-    if arm.name.endswith(".urdf") and any("i" in draft.guess.symbols() for draft in drawn):
-        yield from _in_amperes(robot)
+    if arm.name.endswith(".urdf"):
+        by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
+        yield from _in_amperes([joint for k, joint in enumerate(robot.joints) if k in by_current])
 
 
-def _in_amperes(robot: Robot) -> Iterator[str]:
+def _in_amperes(joints: Sequence[Joint]) -> Iterator[str]:
     """Lines that make currents the effort of joints, as a URDF has no torque constants."""
-    for joint in robot.joints:
+    for joint in joints:
         yield ""
         yield f"[robot_overrides.{joint.name}]"
         yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
@@ -296,6 +297,9 @@ class _Writer:
             yield timing.missing and f"rate: {timing.missing}"
         yield timing.remark
         yield from (f"unit of {name}" for name in self._unknown_units())
+        joints, holding = self.robot.joints, self.draft.guess
+        lacking = {m.joint for m in holding.meanings.values()} - {*holding.joints_of_ranges()}
+        yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
         if self.role.role == "weight":
             yield "weight = ... is missing: without it no mass is estimated"
 
@@ -383,7 +387,8 @@ class _Writer:
         line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
             effect = "; without it, no model of the whole arm is fitted to this log" if self.robot.chain else ""
-            return f"# {line}  # the joint does not move{effect}"
+            at_rest = meaning.joint in holding.joints_of_ranges()
+            return f"# {line}  # {'the joint does not move' if at_rest else 'CHECK: no position of the joint'}{effect}"
         return f"{line}  # {meaning.reason}; {note}"
 
 

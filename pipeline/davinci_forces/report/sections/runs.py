@@ -160,6 +160,9 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
             "messages` explains them:"
         )
         yield Bullets(tuple(remarks_of_stages))
+    of_the_tip = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("resolve", "sense")]
+    if left_out := tuple(literal(text) for diagnostic in of_the_tip for text in diagnostic.text):
+        yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(left_out),))
 
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:

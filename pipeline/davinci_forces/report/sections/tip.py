@@ -6,12 +6,11 @@ import numpy as np
 
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Column, Diagnostic, TipBudget, TipContact, TipForce
+from davinci_forces.records import Column, TipBudget, TipContact, TipForce
 from davinci_forces.report.content import (
     Band,
     Bars,
     Block,
-    Bullets,
     Cell,
     Equation,
     Figure,
@@ -69,9 +68,6 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     for force in others:
         inside = tuple(log_blocks(force, contacts.get(force.log), budgets.get(force.log)))
         yield OnScreen(f"Force at the tip in {literal(force.log)}", f"tip-{force.log}", inside)
-    left_out = [literal(text) for d in context.catalogue.select(Diagnostic, stage="resolve") for text in d.text]
-    if left_out:
-        yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(tuple(left_out)),))
 
 
 def priority(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bool, float]:

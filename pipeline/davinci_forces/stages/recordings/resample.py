@@ -183,7 +183,8 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
         units = "degrees" if joint.kind is Kind.REVOLUTE else "mm"
         fault = (
             f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts? write the "
-            f'unit of the channel in study.toml, as unit = "{units[:3]}", or correct the limits of the robot'
+            f'unit of the channel in study.toml, as unit = "{units[:3]}", or the gear_ratio of a motor, or correct the '
+            "limits of the robot"
         )
         if largest > IMPOSSIBLE:
             raise BadLog(fault)

@@ -44,7 +44,7 @@ def run(
             f"{entry.name}: its force sensor is not compared with an estimate: neither the force at the tip nor the "
             "external effort of a prismatic joint is known for enough samples"
         )
-        yield diagnostic("sense", entry.name, "note", message)
+        yield diagnostic("sense", entry.name, "warning", message)
     for axis, estimate, measured in pairs:
         yield from sensor_force(entry, axis, estimate, touch.t, measured)
 

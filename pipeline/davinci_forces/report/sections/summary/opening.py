@@ -40,7 +40,8 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     narrow[1:] = [name.removeprefix("the ") for name in narrow[1:]]
     which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
     if any(trusted.space is not None for trusted in trusts):
-        parts += [f"the 95 % band is too narrow on {which}"] if narrow else ["all 95 % bands are wide enough"]
+        wide = "in free motion all 95 % bands are wide enough"
+        parts.append(f"the 95 % band is too narrow on {which}" if narrow else wide)
     text = "; ".join(parts) or "no effort was estimated in free space"
     return f"{text[:1].upper()}{text[1:]}."
 
