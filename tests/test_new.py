@@ -321,6 +321,18 @@ def test_the_logs_of_the_demonstration_become_the_shipped_study(tmp_path):
         assert mine == {s.quantity: str(s.channel).rpartition("/")[2] for s in entry.channels}
 
 
+@pytest.mark.parametrize(("tests", "role"), [(True, "identification"), (False, "validation")])
+def test_a_repeating_motion_within_another_identifies_too_where_one_that_does_not_repeat_tests(tmp_path, tests, role):
+    t, q, dq = motion(2, repeats=True)
+    table(tmp_path / "a.csv", t, q, dq, effort(q, dq))
+    table(tmp_path / "b.csv", t, 0.5 * q, 0.5 * dq, effort(0.5 * q, 0.5 * dq))
+    if tests:
+        t, q, dq = motion(2, seed=3, repeats=False)
+        table(tmp_path / "c.csv", t, 0.3 * q, 0.3 * dq, effort(0.3 * q, 0.3 * dq))
+    new(tmp_path)
+    assert [entry.role for entry in reading.read(tmp_path).logs] == ["identification", role] + ["validation"] * tests
+
+
 def test_without_their_names_motion_and_effort_tell_the_roles_of_the_demonstration(tmp_path):
     """A mass changes the effort as a drift does, and tissue is a contact: without a name, no more can be known."""
     alike = {"tissue": "contact", "weight": "validation"}
