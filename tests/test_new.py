@@ -1,5 +1,6 @@
 """What `new` makes of logs that nobody described: by content, by numbers in names, by motion and by size."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -310,6 +311,16 @@ def demonstration(tmp_path, *, neutral: bool) -> dict[str, str]:
     new(tmp_path)
     roles = {entry.files[0]: entry.role for entry in reading.read(tmp_path).logs}
     return {file: roles[name] for file, name in names.items()}
+
+
+def test_a_draft_proposes_the_settings_that_remarks_ask_for_at_their_defaults(tmp_path):
+    t, q, dq = motion(2)
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    proposed = dict(re.findall(r"^# (delay|harmonics|lowpass) = ([\d.]+)", (tmp_path / "study.toml").read_text(), re.M))
+    settings = reading.read(tmp_path).settings
+    assert {name: float(value) for name, value in proposed.items()} == {
+        name: getattr(settings, name) for name in ("delay", "harmonics", "lowpass")
+    }
 
 
 def test_the_logs_of_the_demonstration_become_the_shipped_study(tmp_path):
