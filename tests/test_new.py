@@ -1,5 +1,6 @@
 """What `new` makes of logs that nobody described: by content, by numbers in names, by motion and by size."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -312,6 +313,16 @@ def demonstration(tmp_path, *, neutral: bool) -> dict[str, str]:
     return {file: roles[name] for file, name in names.items()}
 
 
+def test_a_draft_proposes_the_settings_that_remarks_ask_for_at_their_defaults(tmp_path):
+    t, q, dq = motion(2)
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    proposed = dict(re.findall(r"^# (delay|harmonics|lowpass) = ([\d.]+)", (tmp_path / "study.toml").read_text(), re.M))
+    settings = reading.read(tmp_path).settings
+    assert {name: float(value) for name, value in proposed.items()} == {
+        name: getattr(settings, name) for name in ("delay", "harmonics", "lowpass")
+    }
+
+
 def test_the_logs_of_the_demonstration_become_the_shipped_study(tmp_path):
     shipped = reading.read(DEMO)
     assert demonstration(tmp_path, neutral=False) == {entry.files[0]: entry.role for entry in shipped.logs}
@@ -319,6 +330,18 @@ def test_the_logs_of_the_demonstration_become_the_shipped_study(tmp_path):
     for entry in shipped.logs:
         mine = {s.quantity: str(s.channel).rpartition("/")[2] for s in drafted[entry.files].channels}
         assert mine == {s.quantity: str(s.channel).rpartition("/")[2] for s in entry.channels}
+
+
+@pytest.mark.parametrize(("tests", "role"), [(True, "identification"), (False, "validation")])
+def test_a_repeating_motion_within_another_identifies_too_where_one_that_does_not_repeat_tests(tmp_path, tests, role):
+    t, q, dq = motion(2, repeats=True)
+    table(tmp_path / "a.csv", t, q, dq, effort(q, dq))
+    table(tmp_path / "b.csv", t, 0.5 * q, 0.5 * dq, effort(0.5 * q, 0.5 * dq))
+    if tests:
+        t, q, dq = motion(2, seed=3, repeats=False)
+        table(tmp_path / "c.csv", t, 0.3 * q, 0.3 * dq, effort(0.3 * q, 0.3 * dq))
+    new(tmp_path)
+    assert [entry.role for entry in reading.read(tmp_path).logs] == ["identification", role] + ["validation"] * tests
 
 
 def test_without_their_names_motion_and_effort_tell_the_roles_of_the_demonstration(tmp_path):

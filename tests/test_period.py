@@ -191,6 +191,13 @@ def test_a_transient_at_the_start_is_left_out_whichever_quantity_shows_it(symbol
     assert getattr(made, f"sigma_{symbol}") == pytest.approx(size, rel=4 / np.sqrt(2 * degrees))
 
 
+def test_a_derived_velocity_that_errs_at_the_ends_leaves_out_no_period():
+    signal = moved(np.arange(6000) / RATE)
+    ends = np.exp(-signal.t / 1.5) + np.exp((signal.t - signal.t[-1]) / 1.5)
+    [made], texts = run(replace(signal, velocity="derived", dq=signal.dq + 0.012 * ends))
+    assert (made.periods, texts) == (6, [])
+
+
 def test_what_does_not_fill_a_period_is_left_out_at_the_start_before_a_period_is():
     signal = moved(np.arange(5600) / RATE)
     late = replace(signal, tau=signal.tau + 5 * np.exp(-signal.t / 0.7))

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import davinci_forces
 from davinci_forces import commands, exports, guide, robots, stages
 from davinci_forces.cli import app
+from davinci_forces.errors import BadRequest
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.logs import FORMATS
 from davinci_forces.maths.units import SI, UNITS
@@ -352,6 +353,12 @@ def test_messages_are_those_of_the_stages_and_no_stage_with_remarks_is_left_out(
 def test_terms_are_in_order_and_each_once():
     terms = [row[0] for row in rows("term", "means")]
     assert terms == sorted(set(terms))
+
+
+@pytest.mark.parametrize(("topic", "meant"), [("review", "compare"), ("labveiw", "labview")])
+def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_spelled_alike(topic, meant):
+    with pytest.raises(BadRequest, match=f"did you mean {meant}"):
+        guide.page(topic)
 
 
 def test_pages_that_are_made_have_every_field_name_and_robot_once():

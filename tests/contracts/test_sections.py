@@ -270,8 +270,8 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
-    assert opening.verdict_sentence(full, [narrow]).endswith("the 95 % band is too narrow on the hand roll.")
-    assert "can be believed" not in opening.verdict_sentence(full, [narrow])
+    said = opening.verdict_sentence(full, [narrow])
+    assert said == "On an unseen path the model errs by 5 % on the hand roll, but its band is too narrow."
 
 
 def test_page_one_says_what_was_measured_beside_what_is_stated(full: Context):
@@ -320,6 +320,18 @@ def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
     about = context(lab, said)
     [first, *_] = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
     assert first == "the logged velocity is twice its derivative"
+
+
+def test_remarks_that_differ_in_their_log_and_their_numbers_alone_take_one_place_on_page_one(
+    lab: Lab, catalogue: Catalogue
+):
+    texts = [f"log_{i}/hand_roll: harmonic 3 of the position is {i} % of the largest" for i in range(1, 6)]
+    remarks = [diagnostic("differentiate", text.partition(":")[0], "warning", text) for text in texts]
+    remarks.append(diagnostic("differentiate", "log_1", "warning", "log_1: another remark"))
+    about = context(lab, Catalogue(lambda kind: [*catalogue.records(kind), *(remarks if kind is Diagnostic else [])]))
+    first, second, *_ = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
+    assert first == "log_1/hand_roll: harmonic 3 of the position is 1 % of the largest (4 more remarks of this kind)"
+    assert second == "log_1: another remark"
 
 
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):

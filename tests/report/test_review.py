@@ -60,7 +60,7 @@ def test_a_verdict_on_the_study_stands_beside_the_ratings(tmp_path):
     [
         ('verdict = "doubt"', 'verdict = "fine"', "review.toml:3: .*verdict must be one of accept, doubt, reject"),
         (f'results = "{HASH}"', 'results = "x"', "review.toml:4: .*results must be the SHA-256"),
-        (f'results = "{HASH}"', "", "results is missing"),
+        (f'results = "{HASH}"', "", "review.toml:1: rating 1: results must be the SHA-256 of the rated results.json"),
         ('figure = "zoom"', "", "give what is rated"),
         ('figure = "zoom"', 'figure = "zoom"\nrun = "push"', "give what is rated"),
         ('figure = "zoom"', 'figure = "zoom"\ncoment = "x"', "review.toml:3: .*unknown key 'coment'"),

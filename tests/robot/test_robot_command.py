@@ -11,6 +11,7 @@ from davinci_forces.cli import print_errors
 from davinci_forces.commands import robot
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
@@ -82,6 +83,8 @@ def test_the_text_shows_every_matrix_and_no_rounding_errors():
     for title in ("frame   origin [m]", "tip [m]", "J_v of the tip", "J_omega", "\nM\n", "C dq", "G   ", "condition"):
         assert title in text
     assert "e-1" not in text
+    slide = next(joint for joint in DAVINCI.joints if joint.name == "instrument_slide")
+    assert f"gear ratio {slide.gear_ratio:g}, torque constant {slide.torque_constant:g} N m/A; effort in N" in text
 
 
 def test_a_negative_first_value_is_a_value():

@@ -21,7 +21,7 @@ from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
+from davinci_forces.maths.models.terms import Term, coulomb, inertia, offset, stiffness
 from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
@@ -102,7 +102,9 @@ class Export:
         return [visible(line) for line in lines]
 
     def remarks(self) -> list[str]:
-        """Name negative springs, and other negative parameters that physics makes positive."""
+        """Name negative springs, and other negative parameters that physics makes positive; Coulomb friction if its sum
+        with presliding friction is negative.
+        """
         advice = "in a simulation or a compensation it can drive the joint"
         return [
             f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
@@ -111,6 +113,7 @@ class Export:
                 terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
             )
             if value < -SOLVER_ZERO and about.term and (about.term.positive or about.term == stiffness)
+            if about.term != coulomb or sliding_friction(fit, model, about.joint) < 0.0
         ]
 
     def document(self) -> dict[str, Any]:
@@ -126,6 +129,13 @@ class Export:
             "models": {name: _model(*fit) for name, fit in self.fits.items()},
             "joints": [_joint(joint, origin.verdicts.get(joint.name)) for joint in self.joints],
         }  # fmt: skip
+
+
+def sliding_friction(fit: Fit, model: Model, joint: str) -> float:
+    """The friction of a joint far from rest with the sign of its velocity: Coulomb, presliding and smooth add up."""
+    pairs = zip(terms_of(model), fit.theta.tolist(), strict=True)
+    own = ((about.term, value) for about, value in pairs if about.joint == joint)
+    return sum((value for term, value in own if term and (term == coulomb or term.displacement or term.width)), 0.0)
 
 
 def terms_of(model: Model) -> list[ModelTerm]:

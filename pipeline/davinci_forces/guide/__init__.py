@@ -67,7 +67,8 @@ def page(topic: str) -> Page:
     """
     by_topic = {page.topic: page for page in pages()}
     if topic not in by_topic:
-        close = get_close_matches(topic.lower(), by_topic, 3, 0.4) or [t for t in by_topic if topic.lower() in t]
+        titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
+        close = titled[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
         meant = f"did you mean {' or '.join(close)}? " if close else ""
         raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
     return by_topic[topic]

@@ -55,9 +55,12 @@ def _content(subject: str, name: str, table: TomlTable) -> Rating:
         table.text("comment", ""),
         table.text("reviewer", ""),
         table.text("date", ""),
-        table.text("results"),
+        table.text("results", ""),
     )
-    if rating.results and not re.fullmatch(r"[0-9a-f]{64}", rating.results):
-        table.problem(f"results must be the SHA-256 of a results.json, not {rating.results!r}", "results")
+    if not re.fullmatch(r"[0-9a-f]{64}", rating.results):
+        table.problem(
+            f"results must be the SHA-256 of the rated results.json, as the page exports it, not {rating.results!r}",
+            "results",
+        )
     table.close()
     return rating

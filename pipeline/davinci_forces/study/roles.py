@@ -143,6 +143,9 @@ def _by_motion(
         joint for i in [*rest, *fixed] if not recordings[i].holding.steady for joint in recordings[i].holding.moving
     }
     late: list[int] = []
+    moved = {joint for i in rest if recordings[i].holding.repeats for joint in recordings[i].holding.moving}
+    others = (recordings[i].holding for i in rest if not (recordings[i].holding.repeats or excited[i]))
+    is_tested = any(tested) or any(moved <= set(other.moving) and not other.steady for other in others)
     for i in order:
         holding, spans = recordings[i].holding, _spans(recordings[i].holding)
         within = next((reach[joint][1] for joint in spans if joint in reach), "")
@@ -150,7 +153,7 @@ def _by_motion(
             roles[i] = Role("friction", "its joint moves at one constant velocity after another")
         elif not holding.repeats and not excited[i] and set(spans) - set(reach):
             late.append(i)
-        elif (excited[i] and any(tested)) or (
+        elif (is_tested and (holding.repeats or excited[i])) or (
             any(span > WIDER * reach.get(joint, (0.0, ""))[0] for joint, span in spans.items())
             and (holding.repeats or excited[i])
         ):

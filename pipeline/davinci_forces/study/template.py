@@ -204,6 +204,7 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
         yield f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"
     yield ""
     yield "[settings]  # every key has a default; the report lists the values used"
+    yield "# harmonics = 0  # commanded in a periodic excitation, to keep in the position; 0 takes the robot's number"
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf"):

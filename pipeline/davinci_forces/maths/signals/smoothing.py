@@ -61,8 +61,8 @@ def measured_motion(
     """Low-pass position, velocity and acceleration (N,) of a motion that need not repeat, each segment by itself.
 
     The velocity is the logged one if there is one.  Differences are central, at the ends one-sided.  The effort is
-    measured `lag` [s] later than the motion, so the motion is delayed by `lag`.  At the start of a segment the delayed
-    motion is that of the segment's first sample.
+    measured `lag` [s] later than the motion, so the motion is delayed by `lag`.  Beyond the ends of a segment it goes
+    on as it did, so position and velocity agree there, too.
     """
     parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
     position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -79,18 +79,20 @@ def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) 
 
 
 def delay_segments(x: Array, segment: Integers, samples: float) -> Array:
-    """Delay each segment of a signal (N,) by `samples`; at the start of a segment the signal is constant."""
+    """Delay each segment of a signal (N,) by `samples`; beyond its ends the signal goes on as it did."""
     return np.concatenate([_delay(x[part], samples) for part in segments(segment)]) if samples else x
 
 
 def _delay(x: Array, samples: float) -> Array:
-    """Delay a signal (N,) by `samples`, with a cubic spline; beyond its ends the signal is constant."""
+    """Delay a signal (N,) by `samples`, with a cubic spline; beyond its ends x(e + s) = 2 x(e) - x(e - s)."""
     if samples == 0.0:
         return x
     from scipy.interpolate import make_interp_spline
 
     k = np.arange(len(x), dtype=float)
-    return np.asarray(make_interp_spline(k, x, k=min(3, len(x) - 1))(np.clip(k - samples, 0.0, k[-1])))
+    spline, last = make_interp_spline(k, x, k=min(3, len(x) - 1)), k[-1]
+    inside = np.clip(k - samples, 0.0, last)
+    return np.asarray(2.0 * spline(inside) - spline(np.clip(2.0 * inside - (k - samples), 0.0, last)))
 
 
 def segments(segment: Integers) -> Iterator[slice]:

@@ -54,8 +54,10 @@ def run(
         yield diagnostic("average", entry.name, "note", f"{message}; parameters are fitted to its low-passed samples")
         return
     periodic, length = longest_stretch(moving, repeat, max_harmonics, entry)
-    names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in MEASURED]
-    columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
+    # A derived velocity says nothing that its position does not, and its low-pass errs at the ends of a recording.
+    compared = [(x, symbol) for x in moving for symbol in MEASURED if symbol != "dq" or x.velocity == "logged"]
+    names = [f"{symbol} of {signal.joint}" for signal, symbol in compared]
+    columns = [getattr(signal, symbol) for signal, symbol in compared]
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
     agreeing, length, differing = agreeing_stretch(t, positions, columns, periodic, length, rate, max_harmonics)

@@ -36,12 +36,12 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     ]
     parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine])
-    narrow = [name_in_sentence(trusted.joint) for trusted in trusts if trusted.narrow]
+    narrow = [name_in_sentence(t.joint) for t in trusts if t.narrow and t.level != "good"]  # `errors` names the good
     narrow[1:] = [name.removeprefix("the ") for name in narrow[1:]]
     which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
-    if any(trusted.space is not None for trusted in trusts):
-        wide = "in free motion all 95 % bands are wide enough"
-        parts.append(f"the 95 % band is too narrow on {which}" if narrow else wide)
+    parts += [f"the 95 % band is too narrow on {which}"] if narrow else []
+    if any(trusted.space is not None for trusted in trusts) and not any(trusted.narrow for trusted in trusts):
+        parts += ["in free motion all 95 % bands are wide enough"]
     text = "; ".join(parts) or "no effort was estimated in free space"
     return f"{text[:1].upper()}{text[1:]}."
 
