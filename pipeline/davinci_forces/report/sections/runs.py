@@ -104,7 +104,7 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
-    effort, sigma = t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
+    effort = t.tau_ext_smooth
     # The filter has not converged in the first samples: their wide band would set the scale of the plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
     largest = float(abs(effort[shown]).max()) if len(effort[shown]) else 0.0
@@ -120,7 +120,10 @@ def trace(context: Context, t: Track, why: str) -> Figure:
                 (
                     *windows,
                     Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (effort - sigma)[shown], (effort + sigma)[shown], "± 2 σ (total)", "sky"),
+                    Band(
+                        t.t[shown], (effort - 2 * t.tau_ext_smooth_std)[shown],
+                        (effort + 2 * t.tau_ext_smooth_std)[shown], "± 2 σ (total)", "sky",
+                    ),
                     Line(t.t[shown], effort[shown], "smoother", "vermillion"),
                 ),
             ),

@@ -86,11 +86,11 @@ def add_push(t: Array, parts: Sequence[Recording], free: Booleans, push: float) 
     """Add a push to the recorded effort, in the middle of the longest free space, and return its start [s]."""
     longest = max(runs(free), key=lambda run: run.stop - run.start)
     start = float(t[(longest.start + longest.stop) // 2]) - 0.5 * DURATION
-    added, first = push * half_sine(t, start), np.cumsum([0, *(part.samples for part in parts)])
+    first = np.cumsum([0, *(part.samples for part in parts)])
 
-    def add_to_part(part: Recording, push: Array, rows: slice) -> FilterInput:
+    def add_to_part(part: Recording, t: Array, rows: slice) -> FilterInput:
         recorded = part.part(rows)
-        return recorded._replace(tau=recorded.tau + push[rows])
+        return recorded._replace(tau=recorded.tau + push * half_sine(t[rows], start))
 
-    pairs = zip(parts, np.split(added, first[1:-1]), strict=True)
-    return [LongInput(x.samples, x.T_s, x.initial_std, partial(add_to_part, x, push)) for x, push in pairs], start
+    pairs = zip(parts, np.split(t, first[1:-1]), strict=True)
+    return [LongInput(x.samples, x.T_s, x.initial_std, partial(add_to_part, x, t)) for x, t in pairs], start
