@@ -70,7 +70,7 @@ def measured_motion(
     motion is that of the segment's first sample.
     """
     parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
-    position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    position, velocity, acceleration = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
     return position, velocity, acceleration
 
 
@@ -102,7 +102,7 @@ def segments(segment: Integers) -> Iterator[slice]:
     """Yield the runs of equal numbers (N,) in order, such as the segments of a signal between gaps."""
     if len(segment) == 0:
         return
-    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
+    edges = [0, *(np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist(), len(segment)]
     for start, stop in pairwise(edges):
         yield slice(start, stop)
 
@@ -118,7 +118,11 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
 
 def white_std(removed: Array, passed: float) -> float:
     """Standard deviation of white noise, from the part (N,) removed by a low-pass that passes a share of its power."""
-    return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
+    return (
+        float(np.median(np.abs(removed), overwrite_input=True) / NORMAL_MAD / np.sqrt(1.0 - passed))
+        if passed < 1.0
+        else 0.0
+    )
 
 
 def lowpass_segments(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
