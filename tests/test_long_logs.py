@@ -7,13 +7,14 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from davinci_forces.filters import FILTERS, filter_parts, tracker
 from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel
 from davinci_forces.identification import joint_models
 from davinci_forces.maths import arrays
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Regressor
-from davinci_forces.maths.signals import whiteness
+from davinci_forces.maths.signals import smoothing, whiteness
 from davinci_forces.maths.uncertainty import error_band
 from davinci_forces.records import JointModel, PeriodResidual, store
 from tests.benchmarks.test_memory import hour_study, peak
@@ -58,6 +59,17 @@ def test_correlations_of_a_long_series_are_those_of_the_whole(monkeypatch):
     expected = whiteness.cross_correlation(x, u, 20)
     monkeypatch.setattr(whiteness, "BLOCK_SAMPLES", BLOCK)
     np.testing.assert_allclose(whiteness.cross_correlation(x, u, 20), expected, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("cutoff", [0.1, 30.0])
+def test_a_low_pass_in_blocks_has_the_bits_of_the_whole(monkeypatch, cutoff: float):
+    """The padding of one is longer than the signal."""
+    x = np.random.default_rng(1).standard_normal((N, 2))
+    sos, pad = butter(smoothing.FILTER_ORDER, cutoff, fs=RATE, output="sos"), min(3 * round(RATE / cutoff) + 3, N - 1)
+    expected = sosfiltfilt(sos, x, axis=0, padlen=pad)
+    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_array_equal(smoothing.lowpass(x, RATE, cutoff), expected)
+    np.testing.assert_array_equal(smoothing.lowpass(x[:, 0], RATE, cutoff), expected[:, 0])
 
 
 class Plane:

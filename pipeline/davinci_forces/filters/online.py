@@ -185,11 +185,11 @@ class Window(NamedTuple):
         stop = len(samples) - self.middle + self.half
         return np.asarray(weights @ samples[stop - 2 * self.half - 1 : stop])
 
-    def filter_signal(self, x: Array) -> Array:
-        """A signal (N,) and two derivatives at every sample, delayed by `place`; its ends are continued as they are."""
+    def filter_signal(self, x: Array, derivative: int) -> Array:
+        """A derivative of a signal (N,) at every sample, delayed by `place`; its ends are continued as they are."""
         before, after = self.half + self.middle, self.half + max(-self.middle, 0)
         padded = np.concatenate([np.full(before, x[0]), x, np.full(after, x[-1])])
-        return np.array([np.convolve(padded, row[::-1], "valid")[: len(x)] for row in self.smooth])
+        return np.convolve(padded, self.smooth[derivative, ::-1], "valid")[: len(x)]
 
 
 def delay_of(processing: Sequence[tuple[float, float, float]]) -> float:

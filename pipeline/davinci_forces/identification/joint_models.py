@@ -26,10 +26,12 @@ class LogModels:
     A model gets the motion through the low-pass of its fit, and delayed by the lag of the effort.
     """
 
+    _motion_at = staticmethod(motion_at)
+
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
         self.identified = identified
         self._records = {motion.joint: motion for motion in motions}
-        self._motions: dict[tuple[str, float, float], ArmMotion] = {}
+        self._motions: dict[str, tuple[tuple[float, float], ArmMotion]] = {}  # each joint's last, as a log may be long
         self._efforts: dict[tuple[object, ...], Array] = {}
         self._dynamics: dict[tuple[object, ...], tuple[JointDynamics, ...]] = {}
 
@@ -45,10 +47,11 @@ class LogModels:
 
     def joint_motion(self, joint: str, processing: tuple[float, float]) -> ArmMotion:
         """Return the motion of one joint, low-passed at a cutoff [Hz] and delayed by a lag [s]."""
-        key = joint, *processing
-        if key not in self._motions:
-            self._motions[key] = motion_at(self._records[joint], *processing)
-        return self._motions[key]
+        if joint in self._motions and self._motions[joint][0] != processing:
+            del self._motions[joint]
+        if joint not in self._motions:
+            self._motions[joint] = processing, self._motion_at(self._records[joint], *processing)
+        return self._motions[joint][1]
 
     def motion(self, fit: Fit, joint: str) -> ArmMotion:
         """Return the motion of the joints of a fit's model, for a joint's effort; the log must contain these joints."""
@@ -81,12 +84,13 @@ class LogModels:
         dynamics, record = self.dynamics(fit, joint), self._records[joint]
         motion = self.joint_motion(joint, (cutoff, effort_lag))
         delay = (effort_lag - record.effort_lag) * record.rate
-        q, dq = (delay_segments(x, record.segment, delay) for x in (record.q_measured, record.dq_measured))
+        measured = ("q_measured", "dq_measured") if delay else ()  # else those of the record
         return {
             "model": fit.model, "estimator": fit.estimator, "inertia": dynamics.inertia, "tau_known": dynamics.known,
-            "tau_hat": self.tau_hat(fit, joint), "cutoff": cutoff, "effort_lag": effort_lag, "q_measured": q,
-            "dq_measured": dq, "q": motion.q[:, 0], "dq": motion.dq[:, 0], "ddq": motion.ddq[:, 0],
+            "tau_hat": self.tau_hat(fit, joint), "cutoff": cutoff, "effort_lag": effort_lag,
+            "q": motion.q[:, 0], "dq": motion.dq[:, 0], "ddq": motion.ddq[:, 0],
             "static_friction": self.identified.static_friction(fit, joint),
+            **{name: delay_segments(getattr(record, name), record.segment, delay) for name in measured},
             **dict(zip(BIAS, map(float, dynamics.coefficients), strict=True)),
         }  # fmt: skip
 

@@ -158,7 +158,7 @@ class Record:
     def __post_init__(self) -> None:
         for f in fields(self):  # type: ignore[arg-type]
             if f.type in COLUMN_DTYPES:
-                column = np.asarray(getattr(self, f.name), dtype=COLUMN_DTYPES[f.type])
+                column = np.asarray(getattr(self, f.name), dtype=COLUMN_DTYPES[f.type], order="C")
                 object.__setattr__(self, f.name, column)
         lengths = {name: len(getattr(self, name)) for name in self.columns()}
         if len(set(lengths.values())) > 1:

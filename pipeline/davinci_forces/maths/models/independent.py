@@ -91,7 +91,7 @@ class IndependentJoint:
         c = bias_coefficients(self.terms, theta)
         of_z = [theta_i * term.has_z for theta_i, term in zip(theta, self.terms, strict=True)]
         known_effort = efforts(self, np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
-        return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known_effort),)
+        return (JointDynamics(np.broadcast_to(inertia_of(self.terms, theta), len(motion.q)), c, known_effort),)
 
 
 def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:

@@ -70,7 +70,8 @@ def likeness(t: Array, q: Array, period: Array, length: float) -> float:
     """
     K, whole = len(period), int((t[-1] - t[0]) / length + 1e-9)
     if whole:
-        q, t = q[t - t[0] < whole * length], t[t - t[0] < whole * length]
+        N = int(np.sum(t - t[0] < whole * length))
+        q, t = q[:N], t[:N]
     bins = np.rint((t - t[0]) / length % 1.0 * K).astype(np.int64) % K
     sums = np.bincount(bins, q - q.mean(), K)
     shape = period - period.mean()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks
 from davinci_forces.maths.signals.windows import runs
 
 MIN_TIME_STUCK = 0.25  # [s] shortest time at one value before a jump
@@ -58,13 +58,17 @@ def beyond_steps(residual: Array, scored: Booleans, slack: Array, width: int) ->
     Only changes D_k among `scored` samples (N,) count.  A step exceeds twice the largest change between the ends by
     more than the `slack` (N,), which friction explains.
     """
-    sums, excluded = (np.cumsum(np.concatenate([[0.0], x])) for x in (residual, ~scored))
-    k = np.arange(width, len(residual) - width + 1)
-    k = k[excluded[k + width] == excluded[k - width]]
-    size, n = np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]) / width, len(k) // END_SHARE
-    beyond = np.zeros(len(residual), np.bool_)
+    sums = np.cumsum(np.concatenate([[0.0], residual]))
+    excluded = np.cumsum(np.concatenate([[False], ~scored]), dtype=np.int32)
+    k = width + np.flatnonzero(excluded[2 * width :] == excluded[: max(len(excluded) - 2 * width, 0)])
+    n, beyond = len(k) // END_SHARE, np.zeros(len(residual), np.bool_)
+
+    def size(k: Integers) -> Array:
+        return np.asarray(np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]) / width)
+
     if n:
-        steps = size > MIN_STEP_RATIO * size[n:-n].max() + slack[k]
-        beyond[: k[:n][steps[:n]].max(initial=-width) + width] = True
-        beyond[k[-n:][steps[-n:]].min(initial=len(residual) + width) - width :] = True
+        largest = max(size(k[n:-n][rows]).max() for rows in row_blocks(len(k) - 2 * n))
+        start, end = (ks[size(ks) > MIN_STEP_RATIO * largest + slack[ks]] for ks in (k[:n], k[-n:]))
+        beyond[: start.max(initial=-width) + width] = True
+        beyond[end.min(initial=len(residual) + width) - width :] = True
     return beyond

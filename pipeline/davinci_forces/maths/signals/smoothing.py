@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Integers
+from davinci_forces.maths.arrays import Array, Integers, row_blocks
 
 FILTER_ORDER = 4  # of the Butterworth filter, which runs forwards and backwards
 NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
@@ -20,10 +20,15 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
-    from scipy.signal import sosfiltfilt
+    from scipy.signal import sosfilt, sosfilt_zi
 
-    sos = _sections(rate, cutoff)
-    return np.asarray(sosfiltfilt(sos, x, axis=0, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
+    sos, pad = _sections(rate, cutoff), min(3 * round(rate / cutoff) + 3, len(x) - 1)
+    y = np.concatenate([2 * x[:1] - x[pad:0:-1], x, 2 * x[-1:] - x[-2 : -pad - 2 : -1]])
+    for way in (y, y[::-1]):  # as sosfiltfilt, which holds four copies of a long signal at once
+        z = sosfilt_zi(sos).reshape(-1, 2, *(1,) * (x.ndim - 1)) * way[0]
+        for rows in row_blocks(len(y)):
+            way[rows], z = sosfilt(sos, way[rows], axis=0, zi=z)
+    return np.asarray(y[pad:-pad])
 
 
 @cache
@@ -65,7 +70,7 @@ def measured_motion(
     on as it did, so position and velocity agree there, too.
     """
     parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
-    position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    position, velocity, acceleration = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
     return position, velocity, acceleration
 
 
@@ -99,7 +104,7 @@ def segments(segment: Integers) -> Iterator[slice]:
     """Yield the runs of equal numbers (N,) in order, such as the segments of a signal between gaps."""
     if len(segment) == 0:
         return
-    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
+    edges = [0, *(np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist(), len(segment)]
     for start, stop in pairwise(edges):
         yield slice(start, stop)
 
@@ -115,7 +120,11 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
 
 def white_std(removed: Array, passed: float) -> float:
     """Standard deviation of white noise, from the part (N,) removed by a low-pass that passes a share of its power."""
-    return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
+    return (
+        float(np.median(np.abs(removed), overwrite_input=True) / NORMAL_MAD / np.sqrt(1.0 - passed))
+        if passed < 1.0
+        else 0.0
+    )
 
 
 def lowpass_segments(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:

@@ -121,10 +121,12 @@ def cross_correlation(x: Array, u: Array, lags: int) -> Array:
 
 def shape(x: Array) -> tuple[float, float, float]:
     """Skewness, excess kurtosis, and the probability of a larger Jarque-Bera statistic if x (N,) were normal."""
-    from statsmodels.stats.stattools import jarque_bera
-
-    _, probability, skewness, kurtosis = map(float, jarque_bera(x - x.mean()))
-    return skewness, kurtosis - 3.0, probability
+    level = x - x.mean()
+    variance = level @ level / len(x)
+    squares = level**2
+    kurtosis = float(squares @ squares / len(x) / variance**2) - 3.0
+    skewness = float(squares @ level / len(x) / variance**1.5)
+    return skewness, kurtosis, float(np.exp(-len(x) / 12.0 * (skewness**2 + kurtosis**2 / 4.0)))
 
 
 def acf1_std(r: float, N: int) -> float:

@@ -50,11 +50,14 @@ def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
 def error_of_pooled_mean(x: Array, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:
     """Bootstrap the standard error of the mean of samples (N,), in blocks, or of a function of that mean."""
     parts = blocks(len(x))
-    if len(parts) < 2:
+    return _error_of_sums(np.array([x[p].sum() for p in parts]), np.array(_lengths(parts)), seed, function)
+
+
+def _error_of_sums(sums: Array, N: Integers, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:
+    if len(N) < 2:
         return float("nan")
-    draws = _draws(len(parts), seed)
-    sums, samples = (np.array(values)[draws].sum(axis=1) for values in ([x[p].sum() for p in parts], _lengths(parts)))
-    return _spread(function(sums / samples), len(parts))
+    draws = _draws(len(N), seed)
+    return _spread(function(sums[draws].sum(axis=1) / N[draws].sum(axis=1)), len(N))
 
 
 def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
@@ -116,11 +119,12 @@ def root_mean_square(x: Array, scale: Array | None = None) -> tuple[float, float
 
     The standard error is that of R = mean x^2 / mean y^2, from the mean of x^2 - R y^2 over blocks.
     """
-    deviations, squares = x**2, np.ones(1) if scale is None else scale**2
-    power = float(np.mean(squares)) or 1.0
-    ratio = float(np.mean(deviations)) / power
-    deviations -= ratio * squares
-    return root(ratio, error_of_pooled_mean(deviations) / power)
+    parts = blocks(len(x))
+    N = np.array(_lengths(parts))
+    sums, scales = (N if y is None else np.array([y[part] @ y[part] for part in parts]) for y in (x, scale))
+    power = float(scales.sum() / N.sum()) or 1.0
+    ratio = float(sums.sum() / N.sum()) / power
+    return root(ratio, _error_of_sums(sums - ratio * scales, N) / power)
 
 
 def root(square: float, std: float) -> tuple[float, float]:

@@ -138,9 +138,9 @@ def coverage_by_speed(tau_ext: Array, std: Array, dq: Array) -> tuple[Array, Arr
     """
     if len(dq) < MIN_SAMPLES_QUARTILES:
         return np.zeros(0), np.zeros(0)
-    inside = (np.abs(tau_ext) <= NORMAL_95 * std).astype(float)
-    parts = [inside[np.sort(quartile)] for quartile in np.array_split(np.argsort(np.abs(dq), kind="stable"), 4)]
-    n = count_uncorrelated(tau_ext / std) / len(parts)
+    n, inside = count_uncorrelated(tau_ext / std) / 4, np.abs(tau_ext) <= NORMAL_95 * std
+    quartiles = np.array_split(np.argsort(np.abs(dq), kind="stable"), 4)
+    parts = [inside[np.sort(quartile)].astype(float) for quartile in quartiles]
     return np.array([part.mean() for part in parts]), np.array([error_of_coverage(part, n) for part in parts])
 
 

@@ -9,10 +9,10 @@ Words in figures, listings, and the title and study of a document are shown as t
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from davinci_forces.report.content.inline import printable
-from davinci_forces.report.content.marks import Line3D, Panel, Points3D
+from davinci_forces.report.content.marks import AnyMark, Line3D, Points3D
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.content.thinning import points_of, thin_mark
 from davinci_forces.study.review import Rating
@@ -85,11 +85,34 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes; labels carry their unit: `velocity [rad/s]`.
+
+    A mark of very many samples is thinned at once, or the panels of long logs would hold all of them.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    marks: tuple[AnyMark, ...]
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    x_log: bool = False
+    y_log: bool = False
+    x_dates: bool = False  # x is in days since 1970, and the axis shows dates
+    samples: ClassVar[int] = 0  # set on each panel: points of all marks before thinning
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "samples", sum(map(points_of, self.marks)))
+        marks = tuple(_shown(thin_mark(mark, MAX_POINTS_OF_MARK)) for mark in self.marks)
+        object.__setattr__(self, "marks", marks)
+
+
+@dataclass(frozen=True, eq=False)
 class Figure:
     """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
 
-    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A mark of very many samples is
-    thinned at once, or the figures of long logs would hold all of them.
+    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.
     """
 
     caption: str
@@ -102,13 +125,8 @@ class Figure:
     samples: int = field(init=False)  # points of all marks before thinning
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "samples", sum(points_of(mark) for panel in self.panels for mark in panel.marks))
-        object.__setattr__(self, "panels", tuple(_held(panel) for panel in self.panels))
-
-
-def _held(panel: Panel) -> Panel:
-    """A panel with its marks thinned."""
-    return _shown(replace(panel, marks=tuple(_shown(thin_mark(mark, MAX_POINTS_OF_MARK)) for mark in panel.marks)))
+        object.__setattr__(self, "samples", sum(panel.samples for panel in self.panels))
+        object.__setattr__(self, "panels", tuple(map(_shown, self.panels)))
 
 
 def _shown(part: Part) -> Part:

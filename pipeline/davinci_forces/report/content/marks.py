@@ -1,4 +1,4 @@
-"""What a figure shows: panels of marks, as data.  Words in figures are shown as they are, without inline marks."""
+"""What the panels of a figure show: marks, as data.  Words in figures are shown as they are, without inline marks."""
 
 from dataclasses import dataclass, fields
 from typing import Any, Literal
@@ -175,21 +175,6 @@ class Reference:
 
 
 AnyMark = Line | Points | Band | Stems | Histogram | Bars | Tiles | HLine | VLine | HBand | VSpan | Reference
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One pair of axes; labels carry their unit: `velocity [rad/s]`."""
-
-    title: str
-    x_label: str
-    y_label: str
-    marks: tuple[AnyMark, ...]
-    x_range: tuple[float, float] | None = None
-    y_range: tuple[float, float] | None = None
-    x_log: bool = False
-    y_log: bool = False
-    x_dates: bool = False  # x is in days since 1970, and the axis shows dates
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,13 @@
 """Thinning marks of many samples, without hiding an extreme."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.report.content.marks import AnyMark, Band, Line, Points, Stems
 
 Indices = NDArray[np.intp]
@@ -38,29 +39,28 @@ def envelope(x: Array, y: Array, bins: int) -> Indices:
     An extreme is never lost, however short; a range without a finite sample keeps one, so that a gap stays a gap.
     x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
     """
-    starts = _range_starts(x, bins)
-    ranges = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(x)))
-    below, above = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
-    least = below == np.minimum.reduceat(below, starts)[ranges]
-    greatest = above == np.maximum.reduceat(above, starts)[ranges]
-    return np.unique(np.concatenate([_first_of_each(least, ranges), _first_of_each(greatest, ranges)]))
-
-
-def _first_of_each(chosen: NDArray[np.bool_], ranges: Indices) -> Indices:
-    """The first chosen sample of each range."""
-    places = np.flatnonzero(chosen)
-    return places[np.unique(ranges[places], return_index=True)[1]]
+    kept = []
+    for start, stop in pairwise([*_range_starts(x, bins).tolist(), len(x)]):
+        part = y[start:stop]
+        unknown = np.isnan(part)
+        kept += [
+            start + np.argmin(np.where(unknown, np.inf, part)),
+            start + np.argmax(np.where(unknown, -np.inf, part)),
+        ]
+    return np.unique(kept)
 
 
 def _range_starts(x: Array, bins: int) -> Indices:
     """The first sample of each of the equal ranges of x that contain samples."""
-    ranges = np.minimum((x - x[0]) / ((x[-1] - x[0]) or 1.0) * bins, bins - 1).astype(int)
-    return np.flatnonzero(np.diff(ranges, prepend=-1))
+    ranges = np.empty(len(x), np.int32)
+    for rows in row_blocks(len(x)):
+        ranges[rows] = np.minimum((x[rows] - x[0]) / ((x[-1] - x[0]) or 1.0) * bins, bins - 1)
+    return np.append(0, np.flatnonzero(ranges[1:] != ranges[:-1]) + 1)
 
 
 def is_sorted(x: Array) -> bool:
     """Whether x never decreases, as time does."""
-    return bool(np.all(np.diff(x) >= 0))
+    return bool(np.all(x[1:] >= x[:-1]))
 
 
 def points_of(mark: AnyMark) -> int:

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content import Figure
+from davinci_forces.report.content import Figure, Panel
 from davinci_forces.report.content.marks import (
     AnyMark,
     Bars,
     Histogram,
     Line,
     Line3D,
-    Panel,
     Points,
     Points3D,
     Stems,

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import (
+    AnyMark,
     Band,
     Block,
     Bullets,
@@ -16,6 +17,7 @@ from davinci_forces.report.content import (
     Prose,
     Table,
     Verdict,
+    VSpan,
     literal,
 )
 from davinci_forces.report.context import Context, count, label
@@ -104,10 +106,7 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
-    effort, sigma = t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
-    # The filter has not converged in the first samples: their wide band would set the scale of the plot.
-    shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
-    largest = float(abs(effort[shown]).max()) if len(effort[shown]) else 0.0
+    largest = float(abs(t.tau_ext_smooth[shown_rows(t)]).max(initial=0.0))
     return Figure(
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
         "with a band of two standard deviations, and measured minus modelled effort.",
@@ -115,20 +114,29 @@ def trace(context: Context, t: Track, why: str) -> Figure:
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
             effort_panel(t, *windows),
-            Panel(
-                "External effort", "time [s]", label(t, "tau_ext", "external effort"),
-                (
-                    *windows,
-                    Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (effort - sigma)[shown], (effort + sigma)[shown], "± 2 σ (total)", "sky"),
-                    Line(t.t[shown], effort[shown], "smoother", "vermillion"),
-                ),
-            ),
+            external_effort_panel(t, *windows),
         ),
         f"track-figure-{t.log}-{t.joint}",
         zoomable=True,
         height=30,
     )  # fmt: skip
+
+
+def shown_rows(t: Track) -> slice:
+    """The rows after the first samples: the filter's wide band before it converges would set the scale of the plot."""
+    return slice(min(int(0.25 * t.rate), len(t) // 10), None)
+
+
+def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
+    """The external effort over time with its band, and measured minus modelled effort."""
+    shown, effort, sigma = shown_rows(t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
+    marks: tuple[AnyMark, ...] = (
+        *spans,
+        Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
+        Band(t.t[shown], (effort - sigma)[shown], (effort + sigma)[shown], "± 2 σ (total)", "sky"),
+        Line(t.t[shown], effort[shown], "smoother", "vermillion"),
+    )
+    return Panel("External effort", "time [s]", label(t, "tau_ext", "external effort"), marks)
 
 
 def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:

@@ -29,8 +29,9 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     """
     if track.at_rest or not entry.has_known_free_motion:
         return
-    place = track.t, entry.contact, track.rate, track.unscored
-    smoothed, filtered = (which(*place) for which in (free_smoothed, free_space))
+    smoothed, filtered = (
+        which(track.t, entry.contact, track.rate, track.unscored) for which in (free_smoothed, free_space)
+    )
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
     if entry.role != "contact" and int(smoothed.sum()) >= MIN_SAMPLES_LEVEL:

@@ -62,13 +62,14 @@ def compare(
 ) -> Iterator[Comparison | Diagnostic]:
     """Filter a joint of a log without and with a push; measure the level in free space and the response."""
     parts = smooth_filter_inputs(model) if name == "direct" else filter_inputs(model)
-    estimate = filter_parts(name, parts, noise, ("tau_ext", "tau_ext_std"))
-    if not np.isfinite(estimate.tau_ext).all():
+    _, _, tau_ext, std, *_ = filter_parts(name, parts, noise, ("tau_ext", "tau_ext_std"))
+    if not np.isfinite(tau_ext).all():
         return
-    space = levels(estimate.tau_ext[free], estimate.tau_ext_std[free])
+    space = levels(tau_ext[free], std[free])
+    del std  # of a long log, as the filter runs again
     pushed, start = add_push(model.t, parts, free, push)
     change = filter_parts(name, pushed, noise, ("tau_ext",)).tau_ext
-    shown = response(np.subtract(change, estimate.tau_ext, out=change), model.t, start, push)
+    shown = response(np.subtract(change, tau_ext, out=change), model.t, start, push)
     if label == DEFAULT and shown.share < MIN_PUSH_SHARE:
         message = f"{model.log}/{model.joint}: the filter shows only {shown.share:.0%} of a push of {DURATION:g} s"
         yield diagnostic(
@@ -78,7 +79,7 @@ def compare(
         log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
         free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,
         detection_level=space.level_99, detection_level_std=space.level_99_std, push_peak=push, push_share=shown.share,
-        push_delay=shown.delay, t=model.t, tau_ext=estimate.tau_ext,
+        push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
     )  # fmt: skip
 
 
@@ -86,11 +87,11 @@ def add_push(t: Array, parts: Sequence[Recording], free: Booleans, push: float) 
     """Add a push to the recorded effort, in the middle of the longest free space, and return its start [s]."""
     longest = max(runs(free), key=lambda run: run.stop - run.start)
     start = float(t[(longest.start + longest.stop) // 2]) - 0.5 * DURATION
-    added, first = push * half_sine(t, start), np.cumsum([0, *(part.samples for part in parts)])
+    first = np.cumsum([0, *(part.samples for part in parts)])
 
-    def add_to_part(part: Recording, push: Array, rows: slice) -> FilterInput:
+    def add_to_part(part: Recording, t: Array, rows: slice) -> FilterInput:
         recorded = part.part(rows)
-        return recorded._replace(tau=recorded.tau + push[rows])
+        return recorded._replace(tau=recorded.tau + push * half_sine(t[rows], start))
 
-    pairs = zip(parts, np.split(added, first[1:-1]), strict=True)
-    return [LongInput(x.samples, x.T_s, x.initial_std, partial(add_to_part, x, push)) for x, push in pairs], start
+    pairs = zip(parts, np.split(t, first[1:-1]), strict=True)
+    return [LongInput(x.samples, x.T_s, x.initial_std, partial(add_to_part, x, t)) for x, t in pairs], start

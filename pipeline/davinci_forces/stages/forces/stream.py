@@ -26,27 +26,21 @@ MEDIAN_STD = 1.2533  # standard error of a median over that of a mean, of normal
 LONG = 3.0  # a contact is long if it lasts this multiple of the delay
 
 
+def _motion(record: Motion | JointModel, cutoff: float, effort_lag: float) -> ArmMotion:
+    window = Window.design(record.rate, cutoff, effort_lag - record.effort_lag)
+    columns, parts, q = np.empty((3, len(record))), list(segments(record.segment)), record.q_measured
+    signals = ((record.dq_measured, 0), (record.dq_measured, 1)) if record.velocity == "logged" else ((q, 1), (q, 2))
+    for column, (x, derivative) in zip(columns, ((q, 0), *signals), strict=True):
+        for part in parts:
+            column[part] = window.filter_signal(x[part], derivative)
+    q, dq, ddq = columns[:, :, None]
+    return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)
+
+
 class CausalModels(LogModels):
     """Models along a log whose motion is computed as a stream computes it, from a window around each sample."""
 
-    def joint_motion(self, joint: str, processing: tuple[float, float]) -> ArmMotion:
-        """Return the motion of one joint by the window of a cutoff [Hz], delayed by a lag [s]."""
-        key = joint, *processing
-        if key not in self._motions:
-            self._motions[key] = _motion(self._records[joint], *processing)
-        return self._motions[key]
-
-
-def _motion(record: Motion | JointModel, cutoff: float, lag: float) -> ArmMotion:
-    window = Window.design(record.rate, cutoff, lag - record.effort_lag)
-    columns = np.empty((3, len(record)))
-    for part in segments(record.segment):
-        smooth = window.filter_signal(record.q_measured[part])
-        if record.velocity == "logged":
-            smooth[1:] = window.filter_signal(record.dq_measured[part])[:2]
-        columns[:, part] = smooth
-    q, dq, ddq = columns[:, :, None]
-    return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)
+    _motion_at = staticmethod(_motion)
 
 
 def run(
@@ -79,7 +73,10 @@ def run(
             estimate = filter_parts(DEFAULT, parts, filter_noise, ("tau_ext", "nis"))
             del parts
             if not diverges(estimate):
-                yield from compare(track, estimate.tau_ext - track.day_offset, found, entry, late, noise.delay)
+                tau_ext = estimate.tau_ext
+                tau_ext -= track.day_offset
+                del estimate
+                yield from compare(track, tau_ext, found, entry, late, noise.delay)
 
 
 def compare(

@@ -129,15 +129,14 @@ def apply(
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
     for model, noise, delay in zip(models, filter_noises, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
-        motion = velocities(model)
         free = is_outside(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)])
-        yield from innovation_records(model, results.pop(0), motion)
+        yield from innovation_records(model, results.pop(0))
         first = slice(MAX_SAMPLES_SEARCH)
-        moving = is_far_from_reversals(motion[0], 1.0 / model.rate)[first]
-        motion = motion[0][first].copy(), motion[1][first].copy()
+        moving = is_far_from_reversals(velocities(model)[0], 1.0 / model.rate)[first]
         trials = dict(alternatives(model, along, free))
         if delay.any():
-            trials[CLOCK] = correct_times(tried_part(model), *motion, delay[first])
+            dq, ddq = (x[first] for x in velocities(model))
+            trials[CLOCK] = correct_times(tried_part(model), dq, ddq, delay[first])
         subject = Subject(trials, noise, free[part][first], moving)
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
@@ -174,16 +173,20 @@ def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterato
             yield alternative.model, tried_part(under)
 
 
-def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
+def innovation_records(model: JointModel, result: Innovations) -> Iterator[Innovation]:
     """The normalised square of both innovations, and the correlation of the innovations with earlier motion."""
     moving = model.unscored[longest_run(model.t, model.rate)] == 0
     converged = is_past_transient(np.arange(len(result.q)) / model.rate) & moving
-    dq, ddq = (x[converged] for x in motion)
+    by_name = {
+        "innovation_q": (result.q / result.q_std)[converged],
+        "innovation_dq": (result.dq / result.dq_std)[converged],
+    }
+    del result  # of a long log, before its motion is read
+    dq, ddq = (x[converged] for x in velocities(model))
     N = int(converged.sum())
     lags = min(LAGS, N // 4)
     low, high = mean_square_band(N)
-    for name, x, std in (("innovation_q", result.q, result.q_std), ("innovation_dq", result.dq, result.dq_std)):
-        normalised = (x / std)[converged]
+    for name, normalised in by_name.items():
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
             log=model.log, joint=model.joint, signal=name, tested=N, band=TWO_SIDED_95 / N**0.5,

@@ -130,11 +130,11 @@ def apply(
         if stand_in:
             yield diagnostic("predict", about, "note", f"{name}: {stand_in}")
         unscored = unscored_flags(motion, is_scored(motion, along, joint_fit, entry))
+        path = SAME_PATH if is_fitted else identified.path(motion)
         terms = along.fields_of(joint_fit, motion.joint)
         if terms["inertia"].min() <= 0:
             yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit))
             continue
-        path = SAME_PATH if is_fitted else identified.path(motion)
         refit = refits.get(motion.joint)
         model = JointModel.like(
             motion, stand_in=stand_in, path=path, scheme=refit.scheme if refit else "" if is_fitted else motion.role,
