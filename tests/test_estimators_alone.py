@@ -122,16 +122,27 @@ def test_total_least_squares_solve_their_equations():
     assert np.linalg.norm(theta - corrected) < 0.2 * np.linalg.norm(wrong - corrected)
 
 
-@pytest.mark.parametrize(("excess", "more"), [(0.03, False), (0.07, True)])
-def test_residuals_that_exceed_the_noise_are_the_model_s_error_unless_by_less_than_the_noise_is_known(excess, more):
-    """Of very many samples, where chance explains no excess; a variance of 200 degrees of freedom is known to 10 %."""
-    rng, many = np.random.default_rng(7), 50 * K
-    Phi, var = np.tile(PHI, (50, 1)), SIGMA**2 * np.where(np.arange(50 * K) % K < K // 2, 1.0, 4.0)
+ERROR = np.sqrt(2 / (K - 4))  # of the mean square of K residuals of noise, as a share
+
+
+@pytest.mark.parametrize(
+    ("copies", "excess", "more"),
+    [(50, 0.03, False), (50, 0.07, True), (1, 2.8 * ERROR, False), (1, 3.2 * ERROR, True)],
+)
+def test_residuals_that_exceed_the_noise_are_the_model_s_error_unless_by_less_than_the_noise_is_known(
+    copies, excess, more
+):
+    """Of very many samples, where chance explains no excess, a variance of 200 degrees of freedom is known to 10 %.
+
+    Of few samples, chance explains three standard errors.
+    """
+    rng, many = np.random.default_rng(7), copies * K
+    Phi, var = np.tile(PHI, (copies, 1)), SIGMA**2 * np.where(np.arange(many) % K < K // 2, 1.0, 4.0)
     p = Regression(Phi, Phi @ THETA, var, np.full(many, M), (0,), NAMES)
     root = np.sqrt(M / wlse.pool_variance(var, p.periods))
     residual = rng.standard_normal(many)
     A = Phi * root[:, None]
     residual -= A @ np.linalg.lstsq(A, residual, rcond=None)[0]
-    residual *= np.sqrt((1.0 + excess) * many / np.sum(residual**2))
+    residual *= np.sqrt((1.0 + excess) * (many - 4) / np.sum(residual**2))
     p = Regression(Phi, Phi @ THETA + residual / root, var, p.periods, (0,), NAMES)
     assert (np.abs(wlse.estimate(p).theta / THETA - 1.0).max() > 1e-9) == more
