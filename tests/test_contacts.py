@@ -434,12 +434,12 @@ def test_a_push_is_found_in_a_stated_window_that_it_fills_or_leaves():
 
 
 def test_a_log_that_identifies_holds_contacts_only_where_its_effort_is_far_from_the_rest():
-    own = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
+    effort = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
     quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.11, 0.01, "c", 1, 0.95, 0.01, 0.2)]
     about = entry(role="identification")
-    assert measured(track(own, std=0.01, role="contact"), quiet, entry(role="contact"))
-    assert not measured(track(own, role="identification"), quiet, about)
-    touched = own + np.where((T >= 20) & (T <= 22), 2.0, 0.0)
+    assert measured(track(effort, std=0.01, role="contact"), quiet, entry(role="contact"))
+    assert not measured(track(effort, role="identification"), quiet, about)
+    touched = effort + np.where((T >= 20) & (T <= 22), 2.0, 0.0)
     [contact] = measured(track(touched, role="identification"), quiet, about)
     assert contact.onset.tolist() == pytest.approx([20.0], abs=0.1)
 

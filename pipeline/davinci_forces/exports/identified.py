@@ -134,8 +134,10 @@ class Export:
 def sliding_friction(fit: Fit, model: Model, joint: str) -> float:
     """The friction of a joint far from rest with the sign of its velocity: Coulomb, presliding and smooth add up."""
     pairs = zip(terms_of(model), fit.theta.tolist(), strict=True)
-    own = ((about.term, value) for about, value in pairs if about.joint == joint)
-    return sum((value for term, value in own if term and (term == coulomb or term.displacement or term.width)), 0.0)
+    of_joint = ((about.term, value) for about, value in pairs if about.joint == joint)
+    return sum(
+        (value for term, value in of_joint if term and (term == coulomb or term.displacement or term.width)), 0.0
+    )
 
 
 def terms_of(model: Model) -> list[ModelTerm]:

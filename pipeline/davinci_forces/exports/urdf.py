@@ -33,6 +33,7 @@ CONSISTENT = "consistent"  # estimator
 NEGLIGIBLE_MASS = 1e-8  # [kg] of a link: the solver's error of 0
 ROUNDING = 1e-9  # of a coefficient that is 0
 PREFERENCE = 10.0  # price of efforts of drives, cables and offsets over that of links, which explain what they can
+FreeLogs = tuple[list[LogModels], dict[str, list[Array]]]  # of free motion; and the efforts of each joint in them
 
 
 class IdentifiedArm(NamedTuple):
@@ -61,19 +62,20 @@ def render(export: Export) -> dict[str, str]:
         raise BadRequest(f"{export.study.name}: a URDF needs {'; and '.join(missing)}; json and c do not")
     arms = [completed_arm(robot, fit) for fit in consistent_fits(export)]
     arm = min(arms, key=lambda arm: (_left_out_error(export, arm), len(arm.fit.theta)))
-    own = replace(export, joints=tuple(joint._replace(fit=arm.fit, model=arm.model) for joint in export.joints))
+    consistent = replace(export, joints=tuple(joint._replace(fit=arm.fit, model=arm.model) for joint in export.joints))
     near = "nearest to the robot's guesses" if robot.bodies else "of the least mass"
-    lost = _lost(export, arm)
+    free = _free_logs(export, arm.model)
+    lost = _lost(export, arm, free)
     lacks = ", ".join(f"{row[0]} {row[1]} {row[-1]}" for row in lost if float(row[-1].split()[0]) >= 1.0)
     note = [
         f"fit {'.'.join(arm.fit.key)}: of {len(arms)} with possible bodies, its URDF errs least in logs left out",
         f"of all bodies that have it, those {near}",
         f"warning: a URDF cannot hold {lacks or 'terms with less than 1 %'} of the joint's effort; {TABLE} lists all",
     ]
-    for line in (*own.remarks(), note[0], note[-1]):
+    for line in (*consistent.remarks(), note[0], note[-1]):
         export.say(line)
-    urdf = writing.text(arm.robot, own.head(arm.fit) + note, arm.friction)
-    return {"arm.urdf": urdf, TABLE: "\n".join([*own.head(), *note, *_tables(export, arm, lost)]) + "\n"}
+    urdf = writing.text(arm.robot, consistent.head(arm.fit) + note, arm.friction)
+    return {"arm.urdf": urdf, TABLE: "\n".join([*consistent.head(), *note, *_tables(export, arm, free, lost)]) + "\n"}
 
 
 def consistent_fits(export: Export) -> list[Fit]:
@@ -134,7 +136,7 @@ def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: 
     return value * effort
 
 
-def _tables(export: Export, arm: IdentifiedArm, lost: Sequence[tuple[str, ...]]) -> Iterator[str]:
+def _tables(export: Export, arm: IdentifiedArm, free: FreeLogs, lost: Sequence[tuple[str, ...]]) -> Iterator[str]:
     fit, names = arm.fit, [f"{which} of {link}" for link in arm.model.chain.links for which in PARAMETERS]
     rows = arm.model.mechanism.matrix[: len(arm.model.base.columns), : len(names)]
     sums = [
@@ -151,7 +153,7 @@ def _tables(export: Export, arm: IdentifiedArm, lost: Sequence[tuple[str, ...]])
     yield "\n# Error of the models\n\nRoot mean square of measured minus modelled effort over all logs of free motion,"
     yield "with its noise. The report's model error is without that noise, in one log that was not fitted."
     yield from _table("joint", "unit", "effort", "URDF alone", "this fit", "chosen model")
-    along, tau = _free_logs(export, arm.model)
+    along, tau = free
     for name, joint, fit, *_ in export.joints:
         hats = (
             [_held(arm, log, name) for log in along],
@@ -161,9 +163,9 @@ def _tables(export: Export, arm: IdentifiedArm, lost: Sequence[tuple[str, ...]])
         yield _row(name, joint.unit("{effort}"), *(f"{number:.4g}" for number in errors))
 
 
-def _lost(export: Export, arm: IdentifiedArm) -> list[tuple[str, ...]]:
+def _lost(export: Export, arm: IdentifiedArm, free: FreeLogs) -> list[tuple[str, ...]]:
     """What URDF cannot hold: joint, term, value, unit and share of the effort over the logs of free motion."""
-    rows, (along, tau) = list[tuple[str, ...]](), _free_logs(export, arm.model)
+    rows, (along, tau) = list[tuple[str, ...]](), free
     for about, value in arm.remainder.items():
         assert about.term
         effort = (remaining_effort(about, value, arm.model, log.motion(arm.fit, about.joint)) for log in along)
@@ -186,9 +188,7 @@ def _held(arm: IdentifiedArm, log: LogModels, name: str) -> Array:
     return log.tau_hat(arm.fit, name) - sum(remaining_effort(*term, arm.model, motion) for term in lost)
 
 
-def _free_logs(
-    export: Export, model: Model, roles: Sequence[str] = FREE_ROLES
-) -> tuple[list[LogModels], dict[str, list[Array]]]:
+def _free_logs(export: Export, model: Model, roles: Sequence[str] = FREE_ROLES) -> FreeLogs:
     """The logs of free motion that hold all joints of a model, and the efforts of each joint in them."""
     free = [motion for motion in export.catalogue.records(Motion) if motion.role in roles]
     logs = [[motion for motion in free if motion.log == log] for log in dict.fromkeys(motion.log for motion in free)]

@@ -120,11 +120,9 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
 
 def white_std(removed: Array, passed: float) -> float:
     """Standard deviation of white noise, from the part (N,) removed by a low-pass that passes a share of its power."""
-    return (
-        float(np.median(np.abs(removed), overwrite_input=True) / NORMAL_MAD / np.sqrt(1.0 - passed))
-        if passed < 1.0
-        else 0.0
-    )
+    if passed >= 1.0:
+        return 0.0
+    return float(np.median(np.abs(removed), overwrite_input=True) / NORMAL_MAD / np.sqrt(1.0 - passed))
 
 
 def lowpass_segments(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:

@@ -53,7 +53,8 @@ def regulate(
 
     def jacobian(_: float, state: Array) -> Array:
         """d slope / d state (3 n, 3 n) without the small change of M and b; differences would be rounding at rest."""
-        effort(*state.reshape(3, n))
+        q, dq = np.ascontiguousarray(state).reshape(3, n)[:2]
+        mass_and_bias(plant.data.tree, GRAVITY, q, dq, rest, M, b)
         gains = (-law.proportional, -law.derivative - viscous, law.integral)
         accelerations = np.linalg.solve(M + inertia, np.hstack([np.diag(gain) for gain in gains]))
         zero, one = np.zeros((n, n)), np.eye(n)

@@ -24,12 +24,12 @@ def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
         lower, upper = np.fmin.reduceat(mark.lower, starts), np.fmax.reduceat(mark.upper, starts)
         return replace(mark, x=mark.x[starts], lower=lower, upper=upper)
     if is_sorted(mark.x):
-        kept = envelope(mark.x, mark.y, limit // 2)
+        indices = envelope(mark.x, mark.y, limit // 2)
     else:
-        kept = np.arange(0, len(mark.x), -(-len(mark.x) // limit))
-    columns: dict[str, Any] = {"x": mark.x[kept], "y": mark.y[kept]}
+        indices = np.arange(0, len(mark.x), -(-len(mark.x) // limit))
+    columns: dict[str, Any] = {"x": mark.x[indices], "y": mark.y[indices]}
     if isinstance(mark, Points) and mark.y_std is not None:
-        columns["y_std"] = mark.y_std[kept]
+        columns["y_std"] = mark.y_std[indices]
     return replace(mark, **columns)
 
 
@@ -39,15 +39,15 @@ def envelope(x: Array, y: Array, bins: int) -> Indices:
     An extreme is never lost, however short; a range without a finite sample keeps one, so that a gap stays a gap.
     x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
     """
-    kept = []
+    indices = []
     for start, stop in pairwise([*_range_starts(x, bins).tolist(), len(x)]):
         part = y[start:stop]
         unknown = np.isnan(part)
-        kept += [
+        indices += [
             start + np.argmin(np.where(unknown, np.inf, part)),
             start + np.argmax(np.where(unknown, -np.inf, part)),
         ]
-    return np.unique(kept)
+    return np.unique(indices)
 
 
 def _range_starts(x: Array, bins: int) -> Indices:

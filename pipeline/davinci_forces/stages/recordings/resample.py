@@ -156,11 +156,11 @@ def velocity_faults(
 
 def median_ratio(x: Column, reference: Column) -> float:
     """Median of x / reference (N,), weighted by the size of the reference; infinite if that is 0 throughout."""
-    known = np.abs(reference) > 1e-12 * np.abs(reference).max()
-    ratio, weight = x[known] / reference[known], np.abs(reference[known])
+    nonzero = np.abs(reference) > 1e-12 * np.abs(reference).max()
+    ratio, weight = x[nonzero] / reference[nonzero], np.abs(reference[nonzero])
     order = np.argsort(ratio)
     half = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
-    return float(ratio[order[half]]) if known.any() else np.inf
+    return float(ratio[order[half]]) if nonzero.any() else np.inf
 
 
 def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[str]:
