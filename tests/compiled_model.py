@@ -79,7 +79,7 @@ def structure(**fields) -> type:
 
 def same_along_logs(export, folder: Path) -> int:
     """Compare the compiled model with every recorded log, as the study's filter sees it; return the samples."""
-    compiled, samples, robot = CompiledModel(renderer("c")(export), folder), 0, export.study.robot
+    compiled, samples, robot = CompiledModel(renderer("c")(export).files, folder), 0, export.study.robot
     for log in dict.fromkeys(m.log for m in export.catalogue.records(JointModel)):
         motions = export.catalogue.select(Motion, log=log)
         along = LogModels(export.identified, motions)

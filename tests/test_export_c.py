@@ -23,7 +23,7 @@ ROBOTS = {"davinci": DAVINCI, "psm": PSM, "tilted": DAVINCI.with_base((0.3, -0.7
 )
 def model(request, tmp_path_factory):
     given = export(ROBOTS[request.param[0]], request.param[1])
-    return given, CompiledModel(renderer("c")(given), tmp_path_factory.mktemp("c"))
+    return given, CompiledModel(renderer("c")(given).files, tmp_path_factory.mktemp("c"))
 
 
 def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
@@ -64,8 +64,8 @@ def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
 def test_floats_give_four_digits_over_a_whole_log(structure, tmp_path):
     given = export(DAVINCI, structure)
     (tmp_path / "floats").mkdir()
-    exact = CompiledModel(renderer("c")(given), tmp_path)
-    floats = CompiledModel(renderer("c")(given), tmp_path / "floats", floats=True)
+    exact = CompiledModel(renderer("c")(given).files, tmp_path)
+    floats = CompiledModel(renderer("c")(given).files, tmp_path / "floats", floats=True)
     moved, random = motion(len(given.joints)), np.random.default_rng(1)
     t = np.arange(len(moved.q)) / RATE + 0.5 * (moved.segment > 0)
     for i, joint in enumerate(given.joints):
@@ -133,7 +133,7 @@ def test_gravity_and_friction_are_limited_to_the_largest_effort_recorded(tmp_pat
     given = export(DAVINCI, "independent")
     small = {**given.joints[0].validity, "effort": [-0.02, 0.01]}
     tiny = replace(given, joints=tuple(j._replace(validity=small) for j in given.joints))
-    compiled = CompiledModel(renderer("c")(tiny), tmp_path)
+    compiled = CompiledModel(renderer("c")(tiny).files, tmp_path)
     for q in (0.5, -1.5):
         assert abs(compiled.call("gravity", 0, (q, 0, 0))[1]) == 0.02
     assert compiled.call("friction", 0, (0.5, 0, 0), (1.0, 0, 0), state=True)[1] == 0.02

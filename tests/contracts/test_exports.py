@@ -36,15 +36,17 @@ def small(lab, catalogue):
 
 @pytest.mark.parametrize("name", sorted(set(FORMATS) - {"urdf"}))
 def test_every_file_says_where_it_comes_from_and_that_it_is_no_medical_device(name, small):
-    files = renderer(name)(small)
-    assert files == renderer(name)(small)
+    files = renderer(name)(small).files
+    assert files == renderer(name)(small).files
     for file, text in files.items():
         assert re.fullmatch(r"[a-z_./]+", file)
         for line in (ORIGIN.report_id, ORIGIN.version, SAFETY, "SIMULATED", f"exported despite: {ORIGIN.despite[0]}"):
             assert line in text, (file, line)
         assert "valid in the range of" in text or file.endswith("schema.json")
     honest = replace(small, origin=ORIGIN._replace(despite=()), study=replace(small.study, simulated=False))
-    assert not any(word in text for text in renderer(name)(honest).values() for word in ("SIMULATED:", "despite: "))
+    assert not any(
+        word in text for text in renderer(name)(honest).files.values() for word in ("SIMULATED:", "despite: ")
+    )
 
 
 def test_limits_are_those_of_the_robot_and_null_where_it_states_none():
@@ -168,7 +170,7 @@ def predicted(document, name, q, dq, ddq, segment, T):
 @pytest.mark.parametrize("structure", ["independent", "coupled"])
 def test_a_stranger_computes_the_predicted_effort_from_the_json_alone(robot, structure):
     given = export(robot, structure)
-    document = json.loads(renderer("json")(given)["model.json"])
+    document = json.loads(renderer("json")(given).files["model.json"])
     moved = motion(len(robot.joints))
     for i, joint in enumerate(given.joints):
         of_joint = moved if structure == "coupled" else moved._replace(**{
@@ -179,7 +181,7 @@ def test_a_stranger_computes_the_predicted_effort_from_the_json_alone(robot, str
 
 
 def test_the_json_of_a_study_predicts_what_the_study_predicted(small, catalogue):
-    document = json.loads(renderer("json")(small)["model.json"])
+    document = json.loads(renderer("json")(small).files["model.json"])
     models = [m for m in catalogue.records(JointModel) if not m.stand_in]
     assert {m.joint for m in models} == {joint["name"] for joint in document["joints"]}
     for m in models:
@@ -219,7 +221,7 @@ def mistakes(schema, value, place=""):
 
 @pytest.mark.parametrize("structure", ["independent", "coupled"])
 def test_the_json_is_as_its_schema_says(structure):
-    files = renderer("json")(export(PSM, structure))
+    files = renderer("json")(export(PSM, structure)).files
     schema, document = json.loads(files["model.schema.json"]), json.loads(files["model.json"])
     assert mistakes(schema, document) == []
     next(iter(document["models"].values()))["parameters"][0].pop("std")
@@ -311,8 +313,8 @@ def together(lab, catalogue, monkeypatch):
 
 
 def test_the_urdf_and_its_table_say_where_they_come_from_and_what_is_missing(together):
-    files = renderer("urdf")(together)
-    assert files == renderer("urdf")(together)
+    files = renderer("urdf")(together).files
+    assert files == renderer("urdf")(together).files
     for text in files.values():
         for line in (ORIGIN.report_id, ORIGIN.version, SAFETY, "SIMULATED", f"exported despite: {ORIGIN.despite[0]}"):
             assert line in text
@@ -334,11 +336,10 @@ def test_of_fits_the_urdf_takes_the_one_with_which_it_errs_least_and_says_what_i
     worse = replace(fit, model="worse", theta=fit.theta + 100.0 * is_viscous)
     for fits in ([fit, worse], [worse, fit]):
         monkeypatch.setattr(urdf, "consistent_fits", lambda export, fits=fits: fits)
-        said: list[str] = []
-        files = renderer("urdf")(replace(together, say=said.append))
-        assert said[0].startswith(f"fit {'.'.join(fit.key)}: of 2")
-        assert re.search(r"^warning: a URDF cannot hold hand_roll \w+.* \d+ %", said[-1])
-        assert all(line in text for text in files.values() for line in said)
+        files, remarks = renderer("urdf")(together)
+        assert remarks[0].startswith(f"fit {'.'.join(fit.key)}: of 2")
+        assert re.search(r"^warning: a URDF cannot hold hand_roll \w+.* \d+ %", remarks[-1])
+        assert all(line in text for text in files.values() for line in remarks)
 
 
 @pytest.mark.parametrize("name", sorted(set(FORMATS) - {"urdf"}))
@@ -346,11 +347,10 @@ def test_a_negative_spring_or_friction_is_remarked_on_and_a_negative_offset_is_n
     joint = small.joints[0]
     for term in joint.model.terms:
         theta = np.where([str(p) == term.name for p in joint.fit.parameter], -0.5, np.abs(joint.fit.theta))
-        said: list[str] = []
         joints = (joint._replace(fit=replace(joint.fit, theta=theta)),)
-        files = renderer(name)(replace(small, joints=joints, say=said.append))
-        assert len(said) == int(term.positive or term.name == "stiffness")
-        for line in said:
+        files, remarks = renderer(name)(replace(small, joints=joints))
+        assert len(remarks) == int(term.positive or term.name == "stiffness")
+        for line in remarks:
             assert f"{term.name} is negative, -0.5 +- " in line
             assert all(line in text for text in files.values())
 

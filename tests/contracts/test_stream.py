@@ -167,7 +167,7 @@ def test_contacts_and_standstill_are_told(small):
 
 def test_the_package_for_ros_is_the_same_core(small, tmp_path):
     """Without ROS, its core is imported beside the model, with numpy alone, and gives the same numbers."""
-    files = renderer("ros2")(small)
+    files = renderer("ros2")(small).files
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)

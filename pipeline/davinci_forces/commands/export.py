@@ -4,8 +4,6 @@ Research use, not a medical device: try it at reduced torque, with the emergency
 connects to a robot.
 """
 
-import dataclasses
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -49,8 +47,9 @@ def run(
         raise BadRequest(f"{place} exists; --replace replaces it, or --out names another folder")
     if not runs.run(folders.raw, ALL, processed, reports):
         raise BadRequest(f"{folders.raw}: a task failed, so nothing is exported; correct its log, or leave it out")
-    export = permitted_export(folders, joint or [], despite_verdict)
-    files = renderer(to)(dataclasses.replace(export, say=partial(echo, err=True, fg="yellow")))
+    files, remarks = renderer(to)(permitted_export(folders, joint or [], despite_verdict))
+    for remark in remarks:
+        echo(remark, err=True, fg="yellow")
     write_folder(place, {name: text.encode() for name, text in files.items()}, replace)
     for name in files:
         echo(f"see {place / name}")

@@ -7,7 +7,7 @@ from typing import Any
 FORMATS = ("json", "urdf", "c", "ros2")
 
 
-def renderer(name: str) -> Callable[[Any], dict[str, str]]:
-    """Return the function that renders an `identified.Export` in a format: the text of each file, by its name."""
-    render: Callable[[Any], dict[str, str]] = import_module(f"davinci_forces.exports.{name}").render
+def renderer(name: str) -> Callable[[Any], Any]:
+    """Return the function that renders an `identified.Export` in a format, as an `identified.Rendering`."""
+    render: Callable[[Any], Any] = import_module(f"davinci_forces.exports.{name}").render
     return render

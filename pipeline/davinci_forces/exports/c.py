@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import Export
+from davinci_forces.exports.identified import Export, Rendering
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.models.bias import COEFFICIENTS
@@ -17,7 +17,7 @@ NO_BAND = {"edges": [inf] * 3, "factor": [1.0] * 4, "model_variance": 0.0}
 NO_LINK = {"name": "", "parent": None, "coordinate": None, "prismatic": False, "placement": [[0.0] * 4] * 3}
 
 
-def render(export: Export) -> dict[str, str]:
+def render(export: Export) -> Rendering:
     """Render model.h and model.c.
 
     Raises
@@ -33,7 +33,7 @@ def render(export: Export) -> dict[str, str]:
     files = {name: text_of(read_bytes(Path(__file__).with_name(name))) for name in ("model.h", "model.c")}
     for key, value in values.items():
         files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
-    return files
+    return Rendering(files, export.remarks())
 
 
 def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:

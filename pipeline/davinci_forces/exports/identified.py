@@ -1,6 +1,6 @@
 """What is exported of a study: the model of each joint with errors, noise and validity, and the head of each file."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, NamedTuple
@@ -75,7 +75,6 @@ class Export:
     identified: Identified
     joints: tuple[ExportedJoint, ...]
     origin: ExportOrigin
-    say: Callable[[str], None] = lambda remark: None  # tells the user
 
     @property
     def fits(self) -> dict[str, tuple[Fit, Model]]:
@@ -117,9 +116,7 @@ class Export:
         ]
 
     def document(self) -> dict[str, Any]:
-        """The model as JSON values; its remarks are said."""
-        for remark in self.remarks():
-            self.say(remark)
+        """The model as JSON values."""
         robot, origin = self.study.robot, self.origin
         return {
             "head": self.head(), "report_id": origin.report_id, "version": origin.version, "robot": robot.name,
@@ -129,6 +126,13 @@ class Export:
             "models": {name: _model(*fit) for name, fit in self.fits.items()},
             "joints": [_joint(joint, origin.verdicts.get(joint.name)) for joint in self.joints],
         }  # fmt: skip
+
+
+class Rendering(NamedTuple):
+    """An export as the text of each file, by its name, and the remarks for the user."""
+
+    files: dict[str, str]
+    remarks: list[str]
 
 
 def sliding_friction(fit: Fit, model: Model, joint: str) -> float:

@@ -4,19 +4,20 @@ import json
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.exports.identified import Export
+from davinci_forces.exports.identified import Export, Rendering
 from davinci_forces.files import read_bytes, text_of
 
 SCHEMA = "model.schema.json"
 
 
-def render(export: Export) -> dict[str, str]:
+def render(export: Export) -> Rendering:
     """Render model.json and its schema."""
     schema = json.loads(text_of(read_bytes(Path(__file__).with_name(SCHEMA))))
-    return {
-        "model.json": _text({"$schema": SCHEMA, **export.document()}),
-        SCHEMA: _text({**schema, "$comment": "; ".join(export.head())}),
+    files = {
+        "model.json": {"$schema": SCHEMA, **export.document()},
+        SCHEMA: {**schema, "$comment": "; ".join(export.head())},
     }
+    return Rendering({name: _text(content) for name, content in files.items()}, export.remarks())
 
 
 def _text(content: dict[str, Any]) -> str:

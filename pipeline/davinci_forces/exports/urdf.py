@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, terms_of
+from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, Rendering, terms_of
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array
@@ -47,7 +47,7 @@ class IdentifiedArm(NamedTuple):
     remainder: dict[ModelTerm, float]  # what URDF cannot hold
 
 
-def render(export: Export) -> dict[str, str]:
+def render(export: Export) -> Rendering:
     """Render the URDF and the table beside it.
 
     Raises
@@ -72,10 +72,9 @@ def render(export: Export) -> dict[str, str]:
         f"of all bodies that have it, those {near}",
         f"warning: a URDF cannot hold {lacks or 'terms with less than 1 %'} of the joint's effort; {TABLE} lists all",
     ]
-    for line in (*consistent.remarks(), note[0], note[-1]):
-        export.say(line)
     urdf = writing.text(arm.robot, consistent.head(arm.fit) + note, arm.friction)
-    return {"arm.urdf": urdf, TABLE: "\n".join([*consistent.head(), *note, *_tables(export, arm, free, lost)]) + "\n"}
+    table = "\n".join([*consistent.head(), *note, *_tables(export, arm, free, lost)]) + "\n"
+    return Rendering({"arm.urdf": urdf, TABLE: table}, [*consistent.remarks(), note[0], note[-1]])
 
 
 def consistent_fits(export: Export) -> list[Fit]:

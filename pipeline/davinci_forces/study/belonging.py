@@ -7,7 +7,6 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -50,41 +49,34 @@ class Arm(NamedTuple):
     text: str = ""
 
 
-def candidates(folder: Path) -> list[Arm]:
-    """The robots whose joints the channels of logs may name: those described beside the logs, then the listed ones."""
-    arms = []
-    for file in _robot_files(folder):
-        with suppress(BadRobot):
-            arms.append(Arm(file.name, robots.load(file.name, folder), "the file beside the logs"))
-    return [*arms, *(Arm(name, robots.load(name, folder), "") for name in robots.ROBOTS)]
+def candidates(folder: Path) -> tuple[list[Arm], list[str]]:
+    """The robots whose joints the channels of logs may name: those described beside the logs, then the listed ones.
 
-
-def _robot_files(folder: Path) -> list[Path]:
-    """The files beside the logs that may describe a robot."""
-    files = sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")])
-    return [file for file in files if file.name not in ("study.toml", "review.toml")]
-
-
-def _why_not(folder: Path, n: int) -> str:
-    """Why the robots described beside the logs are not those of `n` joints."""
-    reasons = []
-    for file in _robot_files(folder):
+    Also why each file beside the logs is not taken, if none has the joints of the logs.
+    """
+    arms, why_not = [], []
+    for file in sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")]):
+        if file.name in ("study.toml", "review.toml"):
+            continue
         try:
-            count = len(robots.load(file.name, folder).joints)
-            reasons.append(f"{file.name} has {count}, so it is not taken, but by --robot {file.name}")
+            arm = Arm(file.name, robots.load(file.name, folder), "the file beside the logs")
         except BadRobot as why:
-            problem = str(why).splitlines()[-1].strip().replace(f"{folder / file.name}:", "line ")
-            reasons.append(f"{file.name} cannot be read: {problem}")
-    return "".join(f"; {reason}" for reason in reasons)
+            problem = str(why).splitlines()[-1].strip().replace(f"{file}:", "line ")
+            why_not.append(f"{file.name} cannot be read: {problem}")
+        else:
+            arms.append(arm)
+            why_not.append(f"{arm.name} has {len(arm.robot.joints)}, so it is not taken, but by --robot {arm.name}")
+    return [*arms, *(Arm(name, robots.load(name, folder), "") for name in robots.ROBOTS)], why_not
 
 
-def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> Arm:
+def arm_of(
+    holdings: Sequence[Holding], folder: Path, names: Sequence[str], arms: Sequence[Arm], why_not: Sequence[str]
+) -> Arm:
     """Choose the robot of logs: one whose joints the channels name, one that fits, or a new robot.toml.
 
-    `names` are those of the folder, the files and the channels, which may name a robot.
+    `names` are those of the folder, the files and the channels, which may name a robot; the others are `candidates`.
     """
     counted = [holding for holding in holdings if holding.joints]
-    arms = candidates(folder)
     if not counted:
         described = [arm for arm in arms if arm.reason]
         return described[0] if len(described) == 1 else next(arm for arm in arms if arm.name == DEFAULT_ROBOT)
@@ -110,8 +102,8 @@ def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> A
     text = robot_text(_joint_names(largest), current, _prismatic(counted), _limits(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
-    joints, why_not = "joint" if n == 1 else f"{n} joints", _why_not(folder, n)
-    reason = f"written for the {joints} of the logs, as no shipped robot fits{why_not or '; --robot names one'}"
+    joints, why = "joint" if n == 1 else f"{n} joints", "; ".join(why_not) or "--robot names one"
+    reason = f"written for the {joints} of the logs, as no shipped robot fits; {why}"
     return Arm(name, new_robot, reason, text)
 
 

@@ -116,14 +116,15 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         raise BadRequest(
             f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
         )
-    arms = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else candidates(folder)
+    stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
+    arms, why_not = (stated, []) if stated else candidates(folder)
     drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
     if not drawn:
         what = "no log can be read, so no study is written; export the logs again, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
     names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]
-    arm = arms[0] if robot_name else arm_of([draft.guess for draft in drawn], folder, names)
+    arm = stated[0] if stated else arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
     drawn = _named_as(arm.robot, drawn)
     roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
     blocks, rows = [], []

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import Export
+from davinci_forces.exports.identified import Export, Rendering
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.filters import online, sample
 
@@ -17,7 +17,7 @@ HERE = "from davinci_forces.filters."  # of an import in the core, which becomes
 TEMPLATES = ("package.xml", "setup.py", "node.py")
 
 
-def render(export: Export) -> dict[str, str]:
+def render(export: Export) -> Rendering:
     """Render the package, to be built by colcon.
 
     Raises
@@ -43,9 +43,10 @@ def render(export: Export) -> dict[str, str]:
             f"{values['COMMENT']}\n{source.replace(HERE, 'from .')}"
         )
     place = f"$base/lib/{NAME}\n"
-    return files | {
+    files |= {
         "setup.cfg": f"{values['COMMENT']}\n[develop]\nscript_dir={place}[install]\ninstall_scripts={place}",
         f"resource/{NAME}": values["COMMENT"] + "\n",
         f"{NAME}/__init__.py": f'"""External efforts of an arm.\n\n{values["HEAD"]}\n"""\n',
         f"{NAME}/model.json": json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
     }
+    return Rendering(files, export.remarks())
