@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from davinci_forces import filters
 from davinci_forces.errors import PipelineError
-from davinci_forces.filters import ekf, rts, sample, tracker
+from davinci_forces.filters import ekf, problem, rts, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import lag_error, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
+from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
-from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
+from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness, record
 from davinci_forces.stages.forces import ekf as stage
 from davinci_forces.stages.forces import tune, whiteness
 from davinci_forces.stages.model import fit
@@ -295,6 +297,8 @@ def test_a_gap_starts_the_filter_anew(identified):
     [made] = tracked(identified, signal)
     first = np.flatnonzero(signal.t > 50)[0]
     assert made.tau_ext_std[first] > 1.5 * made.tau_ext_std[first - 1]
+    [model] = arm.models([signal], identified[0])
+    assert_allclose(np.concatenate([part.tau for part in problem.filter_inputs(model)]), signal.tau)
 
 
 def band_of(*logs, error, path="another path"):
@@ -408,3 +412,30 @@ def test_a_track_is_white_only_when_all_its_innovations_are(identified):
     q, dq = whiteness.run(track)
     assert isinstance(q, Whiteness)
     assert (q.white, dq.white, q.all_white, dq.all_white) == (1, 0, 0, 0)
+
+
+def in_blocks(made):
+    """The columns of records that follow each other, and the numbers that they all have."""
+    [numbers] = {tuple(str(getattr(record, name)) for name in record.scalars()) for record in made}
+    return {name: np.concatenate([getattr(record, name) for record in made]) for name in made[0].columns()}, numbers
+
+
+@pytest.mark.parametrize("bands", [(), ("another",)])
+def test_a_long_log_is_predicted_and_filtered_in_blocks_as_the_whole(identified, monkeypatch, bands):
+    """Of two segments, one shorter than a block and one longer."""
+    signal, bands = pushed(), [band_of(*bands, error=0.2)] if bands else []
+    object.__setattr__(signal, "segment", (signal.t > 18).astype(int))
+    fits, [noise] = identified
+    [model] = arm.models([signal], fits)
+    [whole] = tracked(identified, signal, bands, contact=((20.0, 30.0),))
+    for module in (arrays, record, filters, problem, stage):
+        monkeypatch.setattr(module, "BLOCK_SAMPLES", 2500)
+    models = arm.models([signal], fits)
+    about = entry(role=signal.role, contact=((20.0, 30.0),))
+    tracks = list(stage.run(model, noise, next(iter(bands), None), about, arm.joint(signal.joint), q_tau=0.0))
+    assert min(len(models), len(tracks)) > 2
+    for made, expected in ((models, model), (tracks, whole)):
+        (columns, numbers), (expected_columns, expected_numbers) = in_blocks(made), in_blocks([expected])
+        assert numbers == expected_numbers
+        for name, column in columns.items():
+            np.testing.assert_array_equal(column, expected_columns[name], name)

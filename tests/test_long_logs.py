@@ -14,9 +14,12 @@ from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel
 from davinci_forces.identification import joint_models
 from davinci_forces.maths import arrays
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Regressor
+from davinci_forces.maths.periods import harmonics
 from davinci_forces.maths.signals import smoothing, whiteness
+from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.uncertainty import error_band
 from davinci_forces.records import JointModel, PeriodResidual, store
+from davinci_forces.report.content.thinning import envelope
 from tests.benchmarks.test_memory import hour_study, peak
 
 RATE, N, BLOCK = 1000.0, 3500, 1000  # the last block is shorter
@@ -110,6 +113,34 @@ def test_a_part_of_a_long_record_is_lazy_and_has_its_rows(tmp_path: Path, monkey
         np.testing.assert_array_equal(later.part(rows).part(slice(1, 5)).t, t[rows][1:5])
         assert len(later.part(rows)) == len(t[rows])
         assert "t" not in vars(later.part(rows))
+
+
+@pytest.mark.parametrize("step_within", [0.0, 3.0])
+def test_steps_of_an_effort_are_found_in_blocks_as_in_the_whole(monkeypatch, step_within: float):
+    rng, k = np.random.default_rng(1), np.arange(N)
+    residual = 0.1 * rng.standard_normal(N) - 3.0 * (k < 60) + step_within * (k > 2000)
+    given = residual, rng.uniform(size=N) > 0.01, np.zeros(N), 10
+    expected = beyond_steps(*given)
+    assert expected.any() == (step_within == 0.0)
+    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_array_equal(beyond_steps(*given), expected)
+
+
+def test_a_long_line_is_drawn_by_the_same_samples_in_blocks_as_in_the_whole(monkeypatch):
+    t, x = np.cumsum(np.random.default_rng(1).uniform(0.0, 2.0, (2, N)), axis=1)
+    expected = envelope(t, np.sin(x), 50)
+    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", BLOCK)
+    np.testing.assert_array_equal(envelope(t, np.sin(x), 50), expected)
+
+
+def test_harmonics_of_uneven_samples_are_fitted_in_blocks_as_over_the_whole(monkeypatch):
+    rng = np.random.default_rng(1)
+    t, x = np.sort(rng.uniform(0.0, 10.0, N)), rng.standard_normal(N)
+    monkeypatch.setattr(harmonics, "MAX_BASIS_SAMPLES", BLOCK)
+    F = harmonics.basis(t, 2.0, 4)
+    c, residual = harmonics.Harmonics(t, 2.0, 4).fit(x)
+    np.testing.assert_allclose(c, np.linalg.lstsq(F, x, rcond=None)[0], rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(residual, x - F @ c, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.slow

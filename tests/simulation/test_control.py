@@ -1,11 +1,14 @@
 """Controllers: their parts, and the studies of chapter 5."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from davinci_forces.maths.simulation import continuous
 from davinci_forces.maths.simulation.actuators import Motors, Regulator
 from davinci_forces.maths.simulation.closed_loop import arm
 from davinci_forces.maths.simulation.continuous import Regulated, regulate
@@ -71,6 +74,23 @@ def test_the_pid_of_table_5_4_removes_that_offset_but_is_worse_than_pd_for_over_
         assert abs(error(pid, 20.0)[joint]) > 0.9 * abs(error(pd, 20.0)[joint])
         assert abs(error(pid, 60.0)[joint]) < 0.2 * abs(error(pd, 60.0)[joint])
     assert np.linalg.norm(error(pid, 20.0)[:3]) > np.linalg.norm(error(pd, 20.0)[:3])
+
+
+def test_the_jacobian_of_a_regulated_arm_is_that_of_differences_where_the_arm_hardly_changes(monkeypatch):
+    """Without gravity and at rest at the target, inertia and bias change in second order alone."""
+    given = []
+
+    def solve(slope, *interval_and_start, jac, **options):
+        given.extend((slope, jac))
+        return solve_ivp(slope, *interval_and_start, jac=jac, **options)
+
+    monkeypatch.setattr(continuous, "solve_ivp", solve)
+    floating = arm(replace(ROBOT.chain, up=(0.0, 0.0, 0.0)), ROBOT.bodies, np.full(6, 0.1))
+    regulate(floating, floating, Regulator(K_P, K_D, K_I, 1.0), VISCOUS, POSE, POSE, 1e-6)
+    (slope, jacobian), state, step = given, np.concatenate([POSE, REST, REST]), 1e-6
+    differences = [(slope(0.0, state + step * e) - slope(0.0, state - step * e)) / (2 * step) for e in np.eye(18)]
+    J = jacobian(0.0, state)
+    assert_allclose(J, np.array(differences).T, rtol=1e-6, atol=1e-7 * np.abs(J).max())
 
 
 def test_a_pi_loop_at_its_limit_stops_integrating_and_comes_back_at_once():
