@@ -14,6 +14,7 @@ from davinci_forces.records import Diagnostic, Recording
 from davinci_forces.stages.recordings import resample
 from tests import arm
 from tests.guide.make_logs import URDF, measured, motion, sensed
+from tests.logs.lvm_writer import Style, Write, lvm
 from tests.test_bad_logs import call_any
 from tests.test_new import table
 
@@ -110,6 +111,74 @@ LOGS: dict[str, Callable[[Columns], Columns]] = {
 }
 
 FIRST = tuple(LOGS)[:7]
+ROLL = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+PLAIN = Style()
+COLUMNS = {"q": ROLL.q, "dq": ROLL.dq, "tau": ROLL.tau}
+
+
+def labview(change=lambda log: log, names=("q", "dq", "tau"), style=PLAIN, **written) -> bytes:
+    """The roll's log as LabVIEW writes it, spoilt; `written` stands in its header."""
+    log = change(COLUMNS | {"t": ROLL.t})
+    return lvm([Write({name: log[name] for name in names}, x=log["t"], step=0.02, **written)], style)
+
+
+def segments(*names: str) -> bytes:
+    """The log in two file segments, each with its channels."""
+    return lvm([
+        Write({name: COLUMNS[name][part] for name in group.split()}, x=ROLL.t[part], step=0.02)
+        for group, part in zip(names, (slice(250), slice(250, None)), strict=True)
+    ])  # fmt: skip
+
+
+def with_lines(start: int, other: bytes) -> bytes:
+    """The log with the lines of another one from `start` on."""
+    return b"\r\n".join(labview().split(b"\r\n")[:start] + other.split(b"\r\n")[start:])
+
+
+def repeated(log: Columns) -> Columns:
+    return log | {"t": np.where(np.arange(len(log["t"])) == 250, log["t"] - 0.02, log["t"])}
+
+
+def missing(log: Columns) -> Columns:
+    return log | {"tau": np.where(np.arange(len(log["t"])) % 50 == 7, np.nan, log["tau"])}
+
+
+LABVIEW = {
+    "degrees": labview(scaled(q=DEG)),
+    "counts": labview(scaled(q=65536, dq=65536)),
+    "current": labview(constant(tau=0.0)),
+    "still": labview(constant(q=0.3, dq=0.0)),
+    "one": labview(cut(1)),
+    "two": labview(cut(2)),
+    "clock": labview(repeated),
+    "marks": with_lines(270, labview(style=Style(decimal="."))),
+    "channel": labview(names=("q", "dq")),
+    "stated": labview(samples=7),
+    "milliseconds": labview(scaled(t=1e3)),
+    "segments": segments("q dq tau", "q tau"),
+    "absent": labview(missing),
+    "text": with_lines(100, labview().replace(b"\t-", b"\tn/a")),
+    "cut": labview()[:-15_000],
+    "header": labview()[:300],
+}
+REMARKS = {
+    "degrees": r'0\.0175 times .* position in degrees\? write unit = "deg"',
+    "counts": r"velocities reach .* degrees or counts\? write .* or the gear_ratio of a motor",
+    "current": r"/hand_roll: the effort is 0 throughout; check the column",
+    "still": r": no joint moves, .*; check its channels, their units, and the clock, of 50 Hz",
+    "one": r"\.lvm: 1 samples are too few, .*; record more",
+    "two": r"/hand_roll: no segment without a gap holds 4 of the 2 samples; record more",
+    "clock": r"\.lvm: time does not increase at row 250 .*: 4\.98 s, then 4\.98 s; name another time channel",
+    "marks": r": line 23: the header's decimal mark is ',', but cells use '\.' and ','; each cell is read with its own",
+    "channel": r"\.lvm: there is no channel 'tau' among its 4; it has 'X_Value', 'q', 'dq'",
+    "stated": r": line 22: the header states 7 samples, but 500 rows follow; these are read",
+    "milliseconds": r'1e\+03 times .* is the time in ms\? write unit = "ms"',
+    "segments": r"\.lvm: channel 'dq' has no sample at row 250 .*, and 250 of its 500 rows .*; record the log again",
+    "absent": r": samples are missing \('tau' 10\): 10 rows with up to 20 ms",
+    "text": r"\.lvm:1\d\d: 'n/a.*' in column 1 \(q\) is not a number; correct the cell",
+    "cut": r": line \d+: the file ends within this row, which is dropped",
+    "header": r"\.lvm:15: no line \*\*\*End_of_Header\*\*\* ends the header",
+}
 
 
 def arms() -> list[tuple[bool, str]]:
@@ -139,6 +208,29 @@ def test_no_log_however_impossible_ends_in_a_bug(tmp_path, name, velocity):
     said = " ".join(call_any("stream", folder).split())
     assert "a bug" not in said
     assert "Traceback" not in said
+
+
+@pytest.fixture(scope="module")
+def remarks(tmp_path_factory) -> str:
+    """What is said of a study with all these files of LabVIEW."""
+    folder = tmp_path_factory.mktemp("lab") / "raw" / "arm"
+    folder.mkdir(parents=True)
+    arm.write_robot(folder)
+    text = 'title = "T"\nrobot = "arm.toml"\n'
+    for name, content in LABVIEW.items():
+        (folder / f"{name}.lvm").write_bytes(content)
+        text += f'[[log]]\nname = "{name}"\nfile = "{name}.lvm"\nrole = "identification"\n[log.channels]\n'
+        text += "".join(f'"hand_roll.{channel}" = "{channel}"\n' for channel in COLUMNS)
+    (folder / "study.toml").write_text(text)
+    return call_any("fit", folder)
+
+
+@pytest.mark.parametrize("name", REMARKS)
+def test_an_impossible_file_of_labview_is_refused_or_remarked_on_with_its_place_and_numbers(remarks, name):
+    assert "a bug" not in remarks
+    assert "Traceback" not in remarks
+    lines = [line for line in remarks.splitlines() if re.search(rf"(error|warning): (\S+/)?{name}\b", line)]
+    assert re.search(REMARKS[name], "\n".join(lines))
 
 
 def resampled(change: Callable[[Columns], Columns], name="hand_roll", velocity="logged") -> list[str]:

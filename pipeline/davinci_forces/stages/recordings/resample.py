@@ -61,7 +61,8 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     whole = [slice(*edges) for edges in pairwise([0, *cuts, len(recording)])]
     parts = [part for part in whole if part.stop - part.start >= MIN_SAMPLES_SEGMENT]
     if not parts:
-        raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {MIN_SAMPLES_SEGMENT} samples")
+        why = f"no segment without a gap holds {MIN_SAMPLES_SEGMENT} of the {len(recording)} samples"
+        raise BadLog(f"{recording.log}/{recording.joint}: {why}; record more, without gaps")
     if all(is_even(recording.t[part], T_s) for part in parts):
         # The mean over the longest segment; a median would carry the rounding of the time stamps.
         T_s = step_of(max((recording.t[part] for part in parts), key=len))

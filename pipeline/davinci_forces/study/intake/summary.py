@@ -21,9 +21,8 @@ def summary(intake: Intake) -> LogSummary:
     missing.require_most(log)
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
         until = f" and those after {entry.until:g} s left out" if intake.ended else ""
-        raise BadLog(
-            f"{log.path}: {clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
-        )
+        why = f"{clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
+        raise BadLog(f"{log.path}: {why}; record more, or take the log out of study.toml")
     feeds: dict[str, list[str]] = {}
     for quantity, channel in intake.channels.items():
         feeds.setdefault(channel.name, []).append(quantity)
