@@ -1,12 +1,14 @@
 """Single estimators against what defines them: their equations, solved in another way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import huber, iv, prior, tls, wlse
-from davinci_forces.estimators.problem import Prior, Regression
+from davinci_forces.estimators.problem import Prior, Regression, factorise
 from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
 
 TWO_LOGS = (0, K // 2)
@@ -146,3 +148,13 @@ def test_residuals_that_exceed_the_noise_are_the_model_s_error_unless_by_less_th
     residual *= np.sqrt((1.0 + excess) * (many - 4) / np.sum(residual**2))
     p = Regression(Phi, Phi @ THETA + residual / root, var, p.periods, (0,), NAMES)
     assert (np.abs(wlse.estimate(p).theta / THETA - 1.0).max() > 1e-9) == more
+
+
+@pytest.mark.parametrize(("weight", "named"), [(0.5, "effort"), (0.0, "effort"), (-0.5, "weight"), (np.nan, "weight")])
+def test_a_share_is_a_weight_and_what_is_negative_or_no_number_is_not(weight: float, named: str):
+    """With another sample whose effort is no number."""
+    p = problem(seed=1)
+    tau, weights = p.tau.copy(), np.ones(K)
+    tau[7], weights[3] = np.nan, weight
+    with pytest.raises(NotIdentifiable, match=f"the {named} of sample {8 if named == 'effort' else 4} of {K}"):
+        factorise(replace(p, tau=tau), weights)

@@ -14,6 +14,7 @@ from davinci_forces.records import (
     Comparison,
     Contact,
     Diagnostic,
+    Excitation,
     Fit,
     FreeSpace,
     LogSummary,
@@ -43,11 +44,12 @@ from davinci_forces.report.content import (
     walk,
 )
 from davinci_forces.report.content.layout import number_blocks
-from davinci_forces.report.context import Context
+from davinci_forces.report.context import Context, title
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (
     DOCUMENTS,
     SECTIONS,
+    excitation,
     filters,
     ground_truth,
     joints,
@@ -416,3 +418,25 @@ def test_what_a_filter_says_before_it_has_converged_is_not_what_an_effort_reache
         effort[at] = 50.0
         figure = runs.trace(full, replace(track, rate=rate, **columns | {"tau_ext_smooth": effort}), "")
         assert ("reaches 50" in figure.alt) == reached
+
+
+def test_a_trajectory_that_exceeds_a_limit_is_warned_of_and_each_curve_and_limit_is_named_once(full: Context):
+    trajectories = full.catalogue.records(Excitation)
+    meanings = {"": "", "excess_q": "position", "excess_dq": "velocity", "excess_ddq": "acceleration"}
+    for exceeded, meaning in meanings.items():
+        changed = [replace(e, **{name: 0.1 * (name == exceeded) for name in meanings if name}) for e in trajectories]
+        catalogue = Catalogue(lambda kind, all_=changed: all_ if kind is Excitation else full.catalogue.records(kind))
+        blocks = excitation.section(replace(full, catalogue=catalogue)).blocks
+        warnings = [block.text for block in blocks if isinstance(block, Verdict)]
+        keys = [f"excitation.{e.joint}.{e.source}.{exceeded}" for e in trajectories if exceeded]
+        for key, text in zip(keys, warnings, strict=True):
+            assert text.endswith(f"exceeds its {meaning} limits by {full.results[key].number(2)}.")
+    for figure in (block for block in blocks if isinstance(block, Figure)):
+        joint = next(e.joint for e in trajectories if figure.caption.startswith(title(e.joint)))
+        shown, limits = [e for e in trajectories if e.joint == joint], full.study.robot.joint(joint).limits
+        for panel, symbol in zip(figure.panels, ("q", "dq", "ddq"), strict=True):
+            lines, ends = panel.marks[: len(shown)], panel.marks[len(shown) :]
+            names = [excitation.source_label(e) if symbol == "q" else "" for e in shown]
+            assert [mark.label for mark in panel.marks] == [*names, "limits" if symbol == "q" else "", ""]
+            assert all(line.y is getattr(e, symbol) for line, e in zip(lines, shown, strict=True))
+            assert [end.y for end in ends] == [*getattr(limits, symbol)]

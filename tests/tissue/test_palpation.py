@@ -15,7 +15,7 @@ from davinci_forces.maths.tissue.indentation import (
     slope_error,
     straight,
 )
-from davinci_forces.maths.tissue.palpation import between_troughs
+from davinci_forces.maths.tissue.palpation import Probing, between_troughs, orient_into_tissue
 from davinci_forces.maths.tissue.tissue import LAWS, cross_validate_law, moments
 from davinci_forces.study import WHOLE_LOG
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
@@ -285,3 +285,13 @@ def test_stated_windows_are_the_pushes():
     assert (pushes[0].t[0], pushes[0].t[-1]) == (1.0, 3.0)
     assert pushes[0].inside.all()
     assert tissue.stiffness == pytest.approx(K, rel=0.02)
+
+
+@pytest.mark.parametrize("excursion", [0.45, 0.6])
+def test_a_force_whose_excursions_one_way_are_twice_as_large_gets_the_sign_of_these(excursion: float):
+    """They reach the 1st and 99th percentile about the median; two outliers reach neither."""
+    force = 0.3 + np.repeat([-1.0, excursion, 0.0, 10.0], [20, 400, 578, 2])
+    zeros, t = np.zeros((1000, 3)), np.arange(1000) / 100.0
+    probing = Probing(t, np.zeros(1000, int), zeros, force[:, None], zeros, np.full(1000, np.nan), np.zeros(1000))
+    sign = -1.0 if excursion < 0.5 else 1.0
+    np.testing.assert_array_equal(orient_into_tissue(probing).force[:, 0], sign * force)

@@ -8,6 +8,7 @@ from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import section_of
 
 SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, corrected", "found": "designed here"}
+MOTION = {"q": "position", "dq": "velocity", "ddq": "acceleration"}
 
 
 @section_of("Excitation", "excitation", Excitation)
@@ -33,9 +34,11 @@ def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     header = ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits")
     yield Table(caption, header, tuple(objectives), "excitation-table", "llrrr")
     for e in excitations:
-        if max(e.excess_q, e.excess_dq, e.excess_ddq) > 0:
-            excess = context.results[f"excitation.{e.joint}.{e.source}.excess_q"].number(2)
-            yield Verdict("warn", f"**{title(e.joint)}**, {source_label(e)}: exceeds its position limits by {excess}.")
+        for symbol, meaning in MOTION.items():
+            if getattr(e, f"excess_{symbol}") > 0:
+                excess = context.results[f"excitation.{e.joint}.{e.source}.excess_{symbol}"].number(2)
+                about = f"**{title(e.joint)}**, {source_label(e)}"
+                yield Verdict("warn", f"{about}: exceeds its {meaning} limits by {excess}.")
     symbols = (f"${name[0]}_{name[1]}$" for name in names)
     caption, columns = "Coefficients of the Fourier series.", ("Joint", "Trajectory", *symbols)
     yield Table(caption, columns, tuple(coefficients), align="llrrrrr")
@@ -53,7 +56,7 @@ def figure(context: Context, trajectories: list[Excitation]) -> Figure:
     first = trajectories[0]
     limits = context.study.robot.joint(first.joint).limits
     panels = []
-    for symbol, meaning in (("q", "position"), ("dq", "velocity"), ("ddq", "acceleration")):
+    for symbol, meaning in MOTION.items():
         named = symbol == "q"  # once is enough: the colours are the same in every panel
         lines = [Line(e.t, getattr(e, symbol), source_label(e) if named else "") for e in trajectories]
         bounds = [HLine(bound, "limits" if named and i == 0 else "") for i, bound in enumerate(getattr(limits, symbol))]
