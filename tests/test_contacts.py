@@ -37,6 +37,7 @@ from davinci_forces.report.content import Number
 from davinci_forces.report.sections.contacts import interval, largest
 from davinci_forces.stages.forces import assess, measure
 from tests import arm
+from tests.report.report_records import free_space as free_space_record
 from tests.test_averaging import entry
 
 RATE = 100.0
@@ -487,3 +488,63 @@ def test_a_swing_after_a_large_push_is_no_contact_and_a_small_push_after_it_is_o
     windows = ((5.0, 7.2), (7.3, 7.8))
     [contact] = measured(of, quiet, entry(role="contact", contact=windows))
     assert (contact.stated.tolist(), contact.found.tolist()) == ([1, 1, 0], [1, 0, 1])
+
+
+def test_an_offset_drifts_where_its_halves_differ_by_more_than_two_standard_errors():
+    halves = np.repeat([0.0, 1.0], 2000) * (T >= 0)
+    assert not day_offset(T, halves, [(0.0, 0.005)]).std  # one sample tells no offset
+    for by, drifts in ((1.9, False), (2.1, True)):
+        quiet = day_offset(T, noise(2), [(-1.0, 50.0)])
+        found = day_offset(T, 0.3 + noise(2) + (by * quiet.drift_std - quiet.drift) * halves, [(-1.0, 50.0)])
+        assert found.drift == pytest.approx(by * found.drift_std, rel=1e-9)
+        assert found.drifts == drifts
+    assert quiet.drift_std == pytest.approx(2.0 * quiet.std, rel=0.3)
+
+
+def test_the_alarm_level_is_that_of_rice_and_at_least_the_largest_effort():
+    for crossings, logarithm in ((2.0, np.log(1200.0)), (1 / 600, 0.0), (1 / 6000, 0.0)):
+        level = alarm_level([FreeMotionStatistics(0.3, 0.01, crossings)])
+        assert level == pytest.approx(max(0.01, 0.3 * np.sqrt(2.0 * logarithm)), rel=1e-12)
+    sine = 0.7 * np.sin(2 * np.pi * 1.5 * T + 0.05)
+    free = (T < 10.0) | (T >= 30.0)  # it crosses zero 15 times in 10 s, each last time just before a window or its end
+    rms, largest_, crossings = free_motion_statistics(sine, free, RATE)
+    assert (rms, largest_) == pytest.approx((0.7 / np.sqrt(2), 0.7), rel=2e-3)
+    assert crossings == pytest.approx(28 / 20.0, rel=1e-12)
+
+
+def test_the_error_of_an_onset_is_noise_over_slope_and_the_shape_of_the_rise():
+    """A ramp of 0.8 s to a peak of 2, under noise whose deviation is stated: 0.05 of it lasts 0.8 s / 2."""
+    ramp = 2.0 * np.clip((T - 5.0) / 0.8, 0.0, 1.0) * (T <= 20.0)
+    for std in (0.0, 0.05, 0.5):
+        [found] = events(T, ramp, np.full(len(T), std), 0.3, rise=0.0)
+        assert found.onset == pytest.approx(5.0, abs=1e-9)
+        assert found.onset_std == pytest.approx(np.hypot(std * 0.8 / 2.0, 0.8 * 0.25 / np.sqrt(3)), rel=1e-9)
+
+
+def test_what_no_mean_reduces_is_in_the_error_of_a_mean_as_it_is():
+    plain, more = (
+        summarise(T, (noise(), np.zeros(len(T))), (10.0, 12.0), T < 5.0, 0.0, constant) for constant in (None, T / 22)
+    )
+    assert more.mean_std == pytest.approx(np.hypot(plain.mean_std, 0.5), rel=1e-9)
+    assert more.impulse_std == pytest.approx(2.0 * more.mean_std, rel=1e-9)
+
+
+def test_the_bootstrap_of_few_blocks_allows_for_the_mean_that_they_share(monkeypatch):
+    monkeypatch.setattr(bootstrap, "DRAWS", 40_000)
+    values = [0.3, -1.0, 2.0, 0.7]
+    assert error_of_mean(values) == pytest.approx(np.std(values, ddof=1) / 2.0, rel=0.02)
+
+
+def test_a_root_has_half_the_relative_error_of_its_square_and_near_zero_the_root_of_the_error():
+    assert bootstrap.root(4.0, 0.4) == pytest.approx((2.0, 0.1), rel=1e-12)
+    assert bootstrap.root(0.01, 0.4) == pytest.approx((0.1, np.sqrt(0.4)), rel=1e-12)
+    assert bootstrap.root(-1.0, 0.4) == pytest.approx((0.0, np.sqrt(0.4)), rel=1e-12)
+
+
+def test_the_coverage_of_logs_has_the_error_of_their_blocks_and_of_three_logs_their_scatter():
+    def spaces(*coverage):
+        return [free_space_record(coverage=c, coverage_std=0.02) for c in coverage]
+
+    assert assess.pooled_coverage(spaces(0.9, 0.96)) == pytest.approx((0.93, 0.02 / np.sqrt(2)))
+    assert assess.pooled_coverage(spaces(0.9, 0.9, 0.99)) == pytest.approx((0.93, 0.03))
+    assert assess.pooled_coverage(spaces(0.94, 0.94, 0.94)) == pytest.approx((0.94, 0.02 / np.sqrt(3)))

@@ -11,6 +11,7 @@ from davinci_forces.maths.uncertainty.error_band import (
     calibrate,
     count_uncorrelated,
     coverage_by_speed,
+    error_of_coverage,
     students_95,
     weighted_quantile,
 )
@@ -140,3 +141,22 @@ def test_a_band_is_as_uncertain_as_its_logs_differ():
         made.append((np.log(calibration.variance(np.full(1, STD), np.zeros(1))[0]) / 2, calibration.relative_std))
     values, errors = np.array(made).T
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=0.4)
+
+
+def test_a_share_of_which_no_sample_lies_outside_has_the_error_of_four_samples_more():
+    """Of Agresti and Coull: two more inside, and two more outside, of n uncorrelated samples."""
+    for inside, n in ((np.ones(400), 40.0), (np.tile([1.0, 1.0, 1.0, 0.0], 100), 40.0)):
+        share = (n * inside.mean() + 2) / (n + 4)
+        assert error_of_coverage(inside, n) == pytest.approx(np.sqrt(share * (1 - share) / (n + 4)), rel=1e-12)
+    rng = np.random.default_rng(1)
+    blocks = np.repeat(rng.integers(0, 2, 20), 50).astype(float)  # the bootstrap knows that these are 20 and not 1000
+    assert error_of_coverage(blocks, 1000.0) == pytest.approx(np.std(blocks[::50], ddof=1) / np.sqrt(20), rel=0.15)
+
+
+def test_the_relative_error_of_a_band_is_that_of_the_mean_over_logs_or_over_blocks_of_few():
+    for logs, unit in ((6, lambda data: data.source), (2, lambda data: data.source * LOG_BLOCKS + data.block)):
+        data = of_logs([free_motion(i) for i in range(logs)])
+        numbers = unit(data)
+        sizes = [np.log(np.quantile(np.abs(data.error[numbers == n]), 0.95)) for n in np.unique(numbers)]
+        expected = np.std(sizes, ddof=1) / np.sqrt(len(sizes))
+        assert calibrate(data).relative_std == pytest.approx(expected, rel=1e-9)

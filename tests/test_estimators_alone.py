@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators import huber, iv, prior, tls, wlse
+from davinci_forces.estimators import huber, iv, lse, prior, tls, wlse
 from davinci_forces.estimators.problem import Prior, Regression, factorise
 from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
 
@@ -158,3 +158,16 @@ def test_a_share_is_a_weight_and_what_is_negative_or_no_number_is_not(weight: fl
     tau[7], weights[3] = np.nan, weight
     with pytest.raises(NotIdentifiable, match=f"the {named} of sample {8 if named == 'effort' else 4} of {K}"):
         factorise(replace(p, tau=tau), weights)
+
+
+@pytest.mark.parametrize("missing", [0, 3])
+def test_few_samples_count_without_the_parameters_and_without_those_that_no_period_has(missing: int):
+    """s^2 = r' W r / (K - p), and the covariance s^2 (Phi' W Phi)^-1."""
+    some, p = slice(None, None, K // 12), problem(seed=2)
+    weight = np.where(np.arange(len(p.tau[some])) < missing, 0, M)
+    few = replace(p, Phi=p.Phi[some], tau=p.tau[some], tau_var=p.tau_var[some], periods=weight)
+    found = lse.estimate(few)
+    residual = few.tau - few.Phi @ found.theta
+    variance = residual @ (weight * residual) / (np.count_nonzero(weight) - 4)
+    covariance = variance * np.linalg.inv(few.Phi.T @ (weight[:, None] * few.Phi))
+    assert_allclose(found.standard_errors.classical, np.sqrt(np.diag(covariance)), rtol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from davinci_forces.maths.contact.force_sensor import errors, interpolate_sensor, lag
+from davinci_forces.maths.contact.force_sensor import errors, interpolate_sensor, lag, reach
 from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, store
 from davinci_forces.robots import load
 from davinci_forces.runner import runs
@@ -200,3 +200,24 @@ def test_a_simulated_sensor_gives_the_error_the_lag_and_the_coverage_that_were_s
     whole = made["vector"]
     assert whole.force_error == pytest.approx(math.sqrt(squares), rel=0.03)
     assert whole.sensor_lag == pytest.approx(LAG, abs=5e-3)
+
+
+def test_a_band_of_three_axes_is_an_ellipsoid_and_the_largest_error_has_the_deviation_along_itself():
+    """chi^2 of three degrees of freedom is 7.815 at 95 %; of one, 1.96 squared."""
+    sigma = np.diag([0.04, 0.09, 0.25])
+    for k, limit in ((3, np.sqrt(7.815)), (1, 1.95996)):
+        C = np.broadcast_to(sigma[:k, :k], (400, k, k))
+        along = np.array([0.6, 0.0, 0.8])[:k] / np.linalg.norm([0.6, 0.0, 0.8][:k])
+        reach_of = 1.0 / np.sqrt(along @ np.linalg.inv(sigma[:k, :k]) @ along)
+        sizes = limit * reach_of * np.where(np.arange(400) < 100, 1.001, 0.999)
+        found = errors(sizes[:, None] * along, C, np.zeros((400, k)))
+        assert found.coverage == 0.75
+        assert found.largest == pytest.approx(sizes[0], rel=1e-9)
+        assert found.largest_std == pytest.approx(np.sqrt(along @ sigma[:k, :k] @ along), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("width", "at", "expected"), [(1.5, 20, 0), (3.0, 20, 1), (80.0, 20, 10), (80.0, 4, 4), (80.0, 36, 4)]
+)
+def test_a_peak_has_the_neighbours_of_at_least_half_its_correlation_on_both_sides(width, at, expected):
+    assert reach(1.0 - np.abs(np.arange(41.0) - at) / width, at) == expected

@@ -509,3 +509,11 @@ def test_masses_contradict_each_other_below_a_probability_of_one_percent(probabi
     found = agreement([low, high])
     assert found.probability == pytest.approx(probability, rel=1e-9)
     assert found.ratio == pytest.approx(apart if widens else 1.0)
+
+
+def test_the_error_of_a_mass_is_the_jackknife_over_sixths_of_the_path():
+    rng, block = np.random.default_rng(2), np.repeat(np.arange(PARTS), 20)
+    x, y = rng.normal(size=(2, 120))
+    without = np.array([np.polyfit(x[block != b], y[block != b], 1)[0] for b in range(6)])
+    expected = np.sqrt(5 / 6 * np.sum((without - without.mean()) ** 2))
+    assert fit_mass([Rows(x, y, block)]).std == pytest.approx(expected, rel=1e-9)
