@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from davinci_forces import filters
 from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, problem, rts, sample, tracker
+from davinci_forces.filters.error_bands import free_errors, total_variance
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import lag_error, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
@@ -18,6 +19,7 @@ from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
+from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness, record
 from davinci_forces.stages.forces import ekf as stage
 from davinci_forces.stages.forces import tune, whiteness
@@ -439,3 +441,17 @@ def test_a_long_log_is_predicted_and_filtered_in_blocks_as_the_whole(identified,
         assert numbers == expected_numbers
         for name, column in columns.items():
             np.testing.assert_array_equal(column, expected_columns[name], name)
+
+
+def test_the_variance_of_a_band_has_twice_the_relative_error_of_its_deviation():
+    """By other logs, and by the other blocks of a single log, each as calibrated."""
+    own, dq = np.full(60, 0.05), np.linspace(-1.0, 1.0, 60)
+    others, itself = band_of("one", "other", "third", error=0.2), band_of("run", error=0.2)
+    errors, blocks = (free_errors(band, False) for band in (others, itself))
+    left_out = [(slice(10 * i, 10 * i + 10), calibrate(blocks.select(blocks.block != i))) for i in range(6)]
+    for about, parts in ((others, [(slice(None), calibrate(errors))]), (itself, left_out)):
+        total = total_variance(about, "run", "another path", dq, own, False)
+        for rows, calibration in parts:
+            variance = calibration.variance(own[rows], dq[rows])
+            assert_allclose(total.variance[rows], variance)
+            assert_allclose(total.std[rows], 2.0 * calibration.relative_std * variance)

@@ -1,11 +1,13 @@
 """Intervals of 95 % hold the true parameters of simulated arms, whether the model has their friction or not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.special import stdtrit
 
+from davinci_forces.identification import model_error
 from davinci_forces.records import Average, Fit, Motion, Recording, Signal, Trajectory
 from davinci_forces.simulation.motion import simulate_log, theta
 from davinci_forces.simulation.scenario.reading import load
@@ -74,3 +76,19 @@ def test_intervals_of_95_percent_hold_the_truth_in_90_to_98_percent_of_20_seeds(
     shares = (np.abs(errors[name]) < 1.96).mean(axis=1)
     half = stdtrit(len(SEEDS) - 1, 0.975) * shares.std(ddof=1) / np.sqrt(len(SEEDS))
     assert 0.90 <= shares.mean() <= 0.98, f"{shares.mean():.3f} +- {half:.3f} of {errors[name].size} intervals"
+
+
+@pytest.mark.parametrize(("variance", "explained"), [(4.0, 0.03), (1.0, 0.0), (0.5, 0.0)])
+def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in_the_other_model(
+    monkeypatch, variance, explained
+):
+    """Of nested models, noise adds the difference of the variances (Hausman, 1978); a parameter may be lacking."""
+    masses, springs = np.eye(2)
+    here = SimpleNamespace(sums={"mass": masses, "spring": springs}, C=np.eye(2), by_block=None, ridge=None)
+    there = SimpleNamespace(sums={"mass": np.ones(1)}, C=variance * np.eye(1), by_block=None, ridge=None)
+    monkeypatch.setattr(model_error, "sums_to_compare", lambda part: part.sums)
+    monkeypatch.setattr(model_error, "unit_variance", lambda part: part.C)
+    monkeypatch.setattr(model_error, "sum_all", lambda cells: cells)
+    monkeypatch.setattr(model_error, "solve", lambda cells, ridge: np.array([2.5]))
+    changes = model_error.squared_changes(here, np.array([2.0, 7.0]), np.array([0.1, 0.1]), there)
+    np.testing.assert_allclose(changes, [0.25 - explained, np.nan])

@@ -16,7 +16,7 @@ from davinci_forces.maths.tissue.indentation import (
     straight,
 )
 from davinci_forces.maths.tissue.palpation import Probing, between_troughs, orient_into_tissue
-from davinci_forces.maths.tissue.tissue import LAWS, cross_validate_law, moments
+from davinci_forces.maths.tissue.tissue import LAWS, FittedLaw, cross_validate_law, force_of, moments, tangent
 from davinci_forces.study import WHOLE_LOG
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
@@ -100,6 +100,9 @@ def test_the_error_of_first_contact_is_as_stated():
         force = K * np.clip(depth - 0.008, 0, None) + noise
         onsets.append(hinge(depth, force).onset)
         stds.append(onset_std(depth, force, hinge(depth, force)))
+    bend = hinge(depth, force)  # what the hinge explains is no error
+    more = force + 3.0 + 100.0 * np.clip(depth - bend.onset, 0, None)
+    assert onset_std(depth, more, bend) == pytest.approx(stds[-1], rel=1e-9)
     assert np.mean(np.abs(np.array(onsets) - 0.008) <= 1.96 * np.array(stds)) >= 0.85
     assert np.mean(stds) < 2 * np.std(onsets)
 
@@ -295,3 +298,14 @@ def test_a_force_whose_excursions_one_way_are_twice_as_large_gets_the_sign_of_th
     probing = Probing(t, np.zeros(1000, int), zeros, force[:, None], zeros, np.full(1000, np.nan), np.zeros(1000))
     sign = -1.0 if excursion < 0.5 else 1.0
     np.testing.assert_array_equal(orient_into_tissue(probing).force[:, 0], sign * force)
+
+
+@pytest.mark.parametrize("law", [law.name for law in LAWS])
+def test_stiffness_and_damping_of_a_model_are_the_derivatives_of_its_force(law: str):
+    model = FittedLaw(next(x for x in LAWS if x.name == law), np.zeros(2), 0.0, 0.0, np.array([300.0, 5.0, 900.0]), 1.4)
+    x, h = 0.004, 1e-6
+    by_depth, by_rate = (
+        float(np.diff(force_of(model, *np.array(ends).T))[0]) / (2 * h)
+        for ends in (((x - h, 0.0), (x + h, 0.0)), ((x, -h), (x, h)))
+    )
+    np.testing.assert_allclose(tangent(model, x), (by_depth, by_rate), rtol=1e-6)

@@ -81,12 +81,11 @@ def onset_std(depth: Array, force: Array, bend: Hinge) -> float:
     It uses the derivatives of the hinge by c, k and d0: 1, (d - d0)^n, and beyond d0 -k n (d - d0)^(n - 1).
     """
     past, n = np.clip(depth - bend.onset, 0.0, None), bend.exponent
-    residual = force - bend.level - bend.slope * past**n
     F = np.column_stack([np.ones_like(past), past**n, np.where(past > 0, -bend.slope * n * past ** (n - 1), 0.0)])
     Q, R = np.linalg.qr(F)
     if np.abs(np.diag(R)).min() <= 1e-12 * np.abs(np.diag(R)).max() or len(depth) <= 4:
         return float("nan")
-    residual = residual - Q @ (Q.T @ residual)
+    residual = force - Q @ (Q.T @ force)
     variance, _ = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3)
     return float(np.sqrt(variance[2]))
 
