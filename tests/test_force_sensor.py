@@ -88,8 +88,10 @@ def test_a_lag_is_found_between_samples_and_under_noise(by):
 
 def test_no_lag_is_told_of_forces_that_are_not_alike_or_too_far_apart():
     random, every = np.random.default_rng(3), np.ones(len(T), bool)
-    assert math.isnan(lag(T, PUSH, T, random.normal(size=PUSH.shape), RATE, every).value)
-    assert math.isnan(lag(T, PUSH, T, late(PUSH, 0.6), RATE, every).value)
+    for size in (1e-3, 1.0, 1e3):  # of the sensor's force, of which the correlation knows nothing
+        assert math.isnan(lag(T, PUSH, T, size * random.normal(size=PUSH.shape), RATE, every).value)
+        assert math.isnan(lag(T, PUSH, T, size * late(PUSH, 0.6), RATE, every).value)
+        assert lag(T, PUSH, T, size * late(PUSH, 0.05), RATE, every).value == pytest.approx(0.05, abs=3e-3)
 
 
 def test_a_sensor_of_three_axes_is_compared_axis_by_axis_and_as_a_vector():

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.identification.regression import pose
+from davinci_forces.maths.estimation import correlation
 from davinci_forces.maths.periods import averaging
 from davinci_forces.records import Average, Signal, Trajectory
 from davinci_forces.robots.dvrk_psm import ROBOT
@@ -97,3 +98,12 @@ def test_intervals_cover_where_a_slow_error_hides_in_white_noise(one, white):
     """One autoregression for both would be that of the faster, and cover half of it."""
     stated, _ = scores(one, 0.97, white)
     assert min(coverage(stated).values()) > 0.91
+
+
+def test_a_spectrum_is_that_of_its_correlations():
+    """S(w) = 1 + 2 sum r_k cos(k w): at w = 0 with the sum of all correlations, and with a mean of 1 over all w."""
+    w = np.linspace(0.0, np.pi, 4097)
+    S, sums = correlation.candidates(w, 60)
+    np.testing.assert_allclose(S[:, 0], 1.0 + sums, rtol=1e-12)
+    np.testing.assert_allclose(np.trapezoid(S, w, axis=1) / np.pi, 1.0, rtol=1e-6)
+    assert len(np.unique(sums)) > len(S) // 2

@@ -16,7 +16,16 @@ from davinci_forces.maths.tissue.indentation import (
     straight,
 )
 from davinci_forces.maths.tissue.palpation import Probing, between_troughs, orient_into_tissue
-from davinci_forces.maths.tissue.tissue import LAWS, FittedLaw, cross_validate_law, force_of, moments, tangent
+from davinci_forces.maths.tissue.tissue import (
+    LAWS,
+    FittedLaw,
+    cross_validate_law,
+    force_of,
+    moments,
+    preferred_law,
+    tangent,
+)
+from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.study import WHOLE_LOG
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
@@ -309,3 +318,19 @@ def test_stiffness_and_damping_of_a_model_are_the_derivatives_of_its_force(law: 
         for ends in (((x - h, 0.0), (x + h, 0.0)), ((x, -h), (x, h)))
     )
     np.testing.assert_allclose(tangent(model, x), (by_depth, by_rate), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("worse", "chosen"), [(0.9, "spring"), (1.1, "Hunt-Crossley")])
+def test_the_simplest_law_is_preferred_unless_it_errs_more_by_a_standard_error(worse: float, chosen: str):
+    """The errors of twenty folds differ by noise, and by a mean in units of its standard error."""
+    differences = np.random.default_rng(4).normal(size=20)
+    differences += worse * error_of_mean(differences) - differences.mean()
+    errors = {"spring": 5.0 + differences, "Kelvin-Voigt": np.full(20, 9.0), "Hunt-Crossley": np.full(20, 5.0)}
+    laws = [
+        FittedLaw(law, errors[law.name], errors[law.name].mean(), 0.0, np.zeros(3), 1.0)
+        for law in LAWS
+        if law.name in errors
+    ]
+    law, why = preferred_law(laws)
+    assert law.law.name == chosen
+    assert ("by no more than chance" in why) == (chosen == "spring")
