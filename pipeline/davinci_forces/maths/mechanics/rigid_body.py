@@ -63,12 +63,10 @@ def coriolis_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -
     return np.asarray(np.swapaxes(columns[0] - columns[1], -1, -2) / 4)
 
 
-def forward_dynamics(
-    chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, tau: ArrayLike, drives: Drives | None = None
-) -> Array:
+def forward_dynamics(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Array:
     """The acceleration ddq (..., n) that efforts tau cause, without contact.  (4.41)"""
-    bias = inverse_dynamics(chain, bodies, q, dq, np.zeros(np.shape(q)), drives)
-    M = mass_matrix(chain, bodies, q, drives)
+    bias = inverse_dynamics(chain, bodies, q, dq, np.zeros(np.shape(q)))
+    M = mass_matrix(chain, bodies, q)
     return np.asarray(np.linalg.solve(M, (np.asarray(tau, float) - bias)[..., None])[..., 0])
 
 
