@@ -12,7 +12,14 @@ from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, problem, rts, sample, tracker
 from davinci_forces.filters.error_bands import free_errors, total_variance
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import lag_error, noise_model, push_response_at_rest, smallest_q_tau
+from davinci_forces.filters.response import (
+    half_sine,
+    lag_error,
+    noise_model,
+    push_response_at_rest,
+    response,
+    smallest_q_tau,
+)
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths import arrays
@@ -455,3 +462,12 @@ def test_the_variance_of_a_band_has_twice_the_relative_error_of_its_deviation():
             variance = calibration.variance(own[rows], dq[rows])
             assert_allclose(total.variance[rows], variance)
             assert_allclose(total.std[rows], 2.0 * calibration.relative_std * variance)
+
+
+def test_a_test_push_is_a_half_sine_of_one_second_and_its_delay_that_of_the_largest_estimate():
+    t = np.arange(600) / 100.0
+    push = half_sine(t, 2.0)
+    assert_allclose(push, np.sin(np.pi * (t - 2.0)) * ((t >= 2.0) & (t <= 3.0)), atol=1e-12)
+    late = 0.8 * half_sine(t, 2.07) + 5.0 * (t > 4.2)  # what comes much later is no response
+    assert response(3.0 * late, t, 2.0, 3.0) == pytest.approx((0.8, 0.07), abs=1e-9)
+    assert response(-3.0 * late, t, 2.0, -3.0) == pytest.approx((0.8, 0.07), abs=1e-9)
