@@ -118,7 +118,7 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
     lines += [
         f"The first three allow any switching and know no delay; k_t_delay is the limit with delay. It is largest, "
         f"{limits['k_t_best']:.4g} N/m ({limits['k_t_best'] / limit:.3g} times), at a delay of "  # type: ignore[operator]
-        f"{limits['best_delay']:.3g} s, of those up to a period of the free hand longer. No setting is changed.",
+        f"{limits['best_delay']:.3g} s, of those up to a period of the free hand longer. No setting is changed."
     ]
     total = (delay or 0.0) + (0.5 / rate if rate else 0.0)
     damping = damping_needed(hand, THESIS_TISSUE, lambda damped: delay_limit(damped, total))

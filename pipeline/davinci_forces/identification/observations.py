@@ -20,14 +20,7 @@ from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.memory import select_samples as first_samples
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.periods.agreement import repetitions
-from davinci_forces.maths.selection import (
-    MAX_GROUPS,
-    PATH_BLOCKS,
-    Equations,
-    path_blocks,
-    side_by_side,
-    sum_equations,
-)
+from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, path_blocks, side_by_side, sum_equations
 from davinci_forces.maths.signals.smoothing import lowpass_segments, reach
 from davinci_forces.records import Average, Motion, Trajectory
 

@@ -26,14 +26,7 @@ from davinci_forces.identification.observations import Observed, Processing
 from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.terms import (
-    OF_MOTION,
-    TERMS,
-    Term,
-    presliding_friction,
-    smooth_sign,
-    stribeck,
-)
+from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term, presliding_friction, smooth_sign, stribeck
 from davinci_forces.maths.selection import CLEARLY, CrossValidation, Ridge, cross_validate, schemes_of, standard_error
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale

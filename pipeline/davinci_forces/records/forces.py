@@ -187,10 +187,7 @@ class Threshold(JointRecord):
     """
 
     KEY = ("joint", "filter")
-    PUBLISHED = (
-        "threshold.{joint}: detection_level± alarm_level±",
-        "band.{joint}: coverage± band_width",
-    )
+    PUBLISHED = ("threshold.{joint}: detection_level± alarm_level±", "band.{joint}: coverage± band_width")
 
     filter: str
     detection_level: float

@@ -61,10 +61,7 @@ class Guess(Record):
 
     KEY = ("group",)
     ROWS = "parameter"
-    PUBLISHED = (
-        "guess.{group}.{slug}: =theta",
-        "guess.{group}: mse±",
-    )
+    PUBLISHED = ("guess.{group}.{slug}: =theta", "guess.{group}: mse±")
 
     group: str
     mse: float

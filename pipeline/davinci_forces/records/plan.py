@@ -12,10 +12,7 @@ class Links(RobotRecord):
 
     UNKNOWN = ("alpha", "a", "d", "offset", "mass")  # NaN for a link without these parameters
     ROWS = "link"
-    PUBLISHED = (
-        "robot: worst_condition",
-        "robot.link.{name}: alpha a d offset mass",
-    )
+    PUBLISHED = ("robot: worst_condition", "robot.link.{name}: alpha a d offset mass")
 
     worst_condition: float  # largest condition number of the tip's Jacobian in the workspace
     link: Labels

@@ -120,10 +120,7 @@ class Motion(LogJointRecord):
 class Average(LogJointRecord):
     """One period of a joint, averaged over the periods of a recording, with the spread between them."""
 
-    PUBLISHED = (
-        "period.{log}: =period± periods",
-        "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±",
-    )
+    PUBLISHED = ("period.{log}: =period± periods", "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±")
 
     rate: float
     period: float

@@ -35,16 +35,7 @@ from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import (
-    Diagnostic,
-    FreeWeight,
-    JointModel,
-    Load,
-    Motion,
-    TorqueConstant,
-    Weight,
-    diagnostic,
-)
+from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, TorqueConstant, Weight, diagnostic
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 

@@ -6,12 +6,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
-from davinci_forces.maths.contact.unexplained import (
-    MIN_UNEXPLAINED,
-    Course,
-    has_outliers,
-    unexplained_share,
-)
+from davinci_forces.maths.contact.unexplained import MIN_UNEXPLAINED, Course, has_outliers, unexplained_share
 from davinci_forces.study.guessing import Holding
 
 # Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.

@@ -16,14 +16,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
 from davinci_forces.logs.log import Log, Options
-from davinci_forces.logs.mat.objects import (
-    MatlabObject,
-    Objects,
-    is_object,
-    seconds,
-    text_of,
-    uniform_times,
-)
+from davinci_forces.logs.mat.objects import MatlabObject, Objects, is_object, seconds, text_of, uniform_times
 
 MAX_ELEMENTS = 1000  # of a struct array or a cell array
 NESTED = ("cell", "struct", "object", "char", "unknown")  # classes of variables that are not numbers

@@ -15,15 +15,7 @@ from davinci_forces.logs.lines import GZIP, Lines, decode
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import (
-    FRAME_BYTES,
-    NO_ROW,
-    NUMBERS,
-    Unclear,
-    both_readings,
-    number_in,
-    split_cells,
-)
+from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, Unclear, both_readings, number_in, split_cells
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 from davinci_forces.maths.arrays import Array
 

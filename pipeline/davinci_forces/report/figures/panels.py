@@ -9,17 +9,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import Figure, Panel
-from davinci_forces.report.content.marks import (
-    AnyMark,
-    Bars,
-    Histogram,
-    Line,
-    Line3D,
-    Points,
-    Points3D,
-    Stems,
-    Tiles,
-)
+from davinci_forces.report.content.marks import AnyMark, Bars, Histogram, Line, Line3D, Points, Points3D, Stems, Tiles
 from davinci_forces.report.content.thinning import is_sorted, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
 from davinci_forces.report.figures.ticks import Axis, axis_over
