@@ -7,11 +7,10 @@ import signal
 import sys
 import threading
 from _thread import start_new_thread
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from copy import copy
-from functools import wraps
 from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
@@ -178,17 +177,6 @@ def errors_as_messages() -> Iterator[None]:
         raise typer.Exit(1) from None
 
 
-def print_errors(run: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a command so that its errors are printed as messages."""
-
-    @wraps(run)
-    def command(*args: Any, **kwargs: Any) -> Any:
-        with errors_as_messages():
-            return run(*args, **kwargs)
-
-    return command
-
-
 def print_version(is_requested: bool) -> None:
     """Print the version and exit, if the option is set."""
     if is_requested:
@@ -227,7 +215,7 @@ def run_stages(study: Path, names: tuple[str, ...], *options: Any) -> bool:
 
 
 @app.command(STAGE, cls=ShownAsWritten)
-@print_errors
+@errors_as_messages()
 def run_named(
     context: typer.Context,
     study: StudyFolder,
@@ -250,7 +238,7 @@ def run_named(
 
 
 @app.command("all", rich_help_panel=FIRST_PANEL, cls=ShownAsWritten)
-@print_errors
+@errors_as_messages()
 def run_all(
     studies: Studies = None,
     processed: Processed = None,
@@ -276,4 +264,4 @@ for name in COMMANDS:
     command_module = import_module(f"davinci_forces.commands.{name}")
     panel = FIRST_PANEL if name in FIRST_COMMANDS else LAST_PANEL
     command = app.command(name, help=command_module.__doc__, rich_help_panel=panel, cls=ShownAsWritten)
-    command(print_errors(command_module.run))
+    command(errors_as_messages()(command_module.run))

@@ -7,7 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from davinci_forces.cli import print_errors
+from davinci_forces.cli import errors_as_messages
 from davinci_forces.commands import robot
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
@@ -16,7 +16,7 @@ from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
 app = typer.Typer()
-app.command()(print_errors(robot.run))
+app.command()(errors_as_messages()(robot.run))
 
 
 def asked(*words):
