@@ -39,7 +39,7 @@ def smoothed(shape, duration, peak, seed):
     q, dq = (std * chance.normal(size=len(T)) for std in (NOISE.r_q, NOISE.r_dq))
     joint = joint._replace(q=q, dq=dq)
     made, spread = rts.track(joint, NOISE), rise(rts.track, joint, NOISE)
-    return true, made.tau_ext, made.tau_ext_std, rounding_error(made.tau_ext, made.tau_ext_std, T_S, spread), spread
+    return true, made.tau_ext, made.tau_ext_std, rounding_error(made.tau_ext, made.tau_ext_std**2, T_S, spread), spread
 
 
 @pytest.mark.parametrize("peak", [0.5, 1.0, 3.0])
@@ -69,9 +69,9 @@ def test_a_rounded_step_and_a_rounded_tip_are_off_by_what_is_stated():
 def test_no_noise_is_taken_for_rounding_and_blocks_change_nothing(monkeypatch):
     _, effort, std, rounding, spread = smoothed("half-sine", 1.0, 1.0, 0)
     assert (rounding[(T > 2.0) & (T < 8.0)] == 0.0).mean() > 0.6
-    assert rounding_error(effort[:1], std[:1], T_S, spread) == [0.0]
+    assert rounding_error(effort[:1], std[:1] ** 2, T_S, spread) == [0.0]
     monkeypatch.setattr("davinci_forces.maths.arrays.BLOCK_SAMPLES", 150)
-    np.testing.assert_allclose(rounding_error(effort, std, T_S, spread), rounding, atol=1e-12)
+    np.testing.assert_allclose(rounding_error(effort, std**2, T_S, spread), rounding, atol=1e-12)
 
 
 def test_times_of_contact_have_the_errors_that_are_stated():

@@ -134,8 +134,8 @@ def lag_error(recordings: Sequence[Recording], smoothed: Array, noise: NoiseMode
     return np.subtract(smoothed, shown, out=shown)
 
 
-def rounding_error(tau_ext: Array, std: Array, T_s: float, rise: float) -> Array:
-    """Estimate how far a smoothed effort (N,) with its deviation (N,) is off where the effort changes fast.
+def rounding_error(tau_ext: Array, variance: Array, T_s: float, rise: float) -> Array:
+    """Estimate how far a smoothed effort (N,) with its variance (N,) is off where the effort changes fast.
 
     A smoother that spreads a step over the time `rise` [s] is off by half of what it would change in that time.  At a
     peak it is off by its distance from its mean within `TIP_REACH`.  Of that, one standard deviation is due to noise.
@@ -148,5 +148,5 @@ def rounding_error(tau_ext: Array, std: Array, T_s: float, rise: float) -> Array
         mean = (total[2 * reach + 1 :] - total[: -2 * reach - 1]) / (2 * reach + 1)
         size = np.hypot(0.5 * rise / T_s * np.gradient(near), near - mean)
         inside = slice(rows.start - first, rows.stop - first)
-        error[rows] = np.maximum(size[inside] - std[rows], 0.0)
+        error[rows] = np.maximum(size[inside] - np.sqrt(variance[rows]), 0.0)
     return error

@@ -57,7 +57,7 @@ def track_effort(
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
     smooth_rise = rise(rts.track, parts[0], noise)
     rounding = np.concatenate([
-        rounding_error(smoothed[part], np.sqrt(variance[part]), 1.0 / model.rate, smooth_rise)
+        rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
         for part in segments(model.segment)
     ])  # fmt: skip
     numbers |= {
