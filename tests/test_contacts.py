@@ -329,7 +329,7 @@ def test_a_ramp_and_a_step_begin_where_they_began(seed):
     first, second = events(T, smooth, np.full(len(T), 0.03), 0.3, rise=0.3)
     for found, true in zip((first.onset, first.release, second.onset, second.release), (9, 11, 20, 23), strict=True):
         assert found == pytest.approx(true, abs=0.1)
-    assert second.onset_std < 0.03  # a step has hardly a shape; the rest is noise
+    assert second.onset_std < 0.05  # a step has hardly a shape; the rest is noise, and how far it may lengthen a rise
     assert first.onset_std == pytest.approx(0.25 / np.sqrt(3), rel=0.25)  # by the shape of a rise of one second
 
 

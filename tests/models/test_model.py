@@ -44,6 +44,13 @@ def wandering(N, seed=0, segments=1, periodic=False):
     return ArmMotion(q, dq, ddq, T_S, np.arange(N) * segments // N, periodic)
 
 
+def test_only_friction_that_depends_on_a_displacement_or_a_velocity_has_a_scale():
+    """A chosen model is read from its fit by names and scales, so a scale of other columns would name another term."""
+    scales = {parameter.name: parameter.scale for parameter in coupled().parameters}
+    assert {name for name, scale in scales.items() if scale} == {"presliding friction 1 of one"}
+    assert scales["presliding friction 1 of one"] == 0.02
+
+
 ROTOR, SPRING, OFFSET = np.array([0.3, 0.2]), np.array([1.5, 0.0]), np.array([0.0, -0.4])
 OF_FRICTION = np.array([1.0, 0.5, 0.8, 0.3])
 

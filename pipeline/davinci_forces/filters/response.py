@@ -21,8 +21,9 @@ from davinci_forces.filters.problem import (
     column,
     stationary_joint,
 )
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
+from davinci_forces.maths.contact.detection import TIP_REACH
 from davinci_forces.maths.models.bias import VISCOUS
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
@@ -131,3 +132,21 @@ def lag_error(recordings: Sequence[Recording], smoothed: Array, noise: NoiseMode
     ]
     shown = filter_parts(DEFAULT, inputs, noise, ("tau_ext",)).tau_ext
     return np.subtract(smoothed, shown, out=shown)
+
+
+def rounding_error(tau_ext: Array, variance: Array, T_s: float, rise: float) -> Array:
+    """Estimate how far a smoothed effort (N,) with its variance (N,) is off where the effort changes fast.
+
+    A smoother that spreads a step over the time `rise` [s] is off by half of what it would change in that time.  At a
+    peak it is off by its distance from its mean within `TIP_REACH`.  Of that, one standard deviation is due to noise.
+    """
+    error, reach = np.zeros(len(tau_ext)), round(TIP_REACH * rise / T_s)
+    for rows in row_blocks(len(tau_ext)) if len(tau_ext) > 1 else ():
+        first = max(rows.start - reach - 1, 0)
+        near = tau_ext[first : rows.stop + reach + 1]
+        total = np.cumsum(np.pad(near, (reach + 1, reach), "edge"))
+        mean = (total[2 * reach + 1 :] - total[: -2 * reach - 1]) / (2 * reach + 1)
+        size = np.hypot(0.5 * rise / T_s * np.gradient(near), near - mean)
+        inside = slice(rows.start - first, rows.stop - first)
+        error[rows] = np.maximum(size[inside] - np.sqrt(variance[rows]), 0.0)
+    return error

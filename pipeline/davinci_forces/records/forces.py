@@ -87,8 +87,8 @@ class Track(LogJointRecord):
     """The external effort on one joint during one log, by filter and smoother, each with its standard deviation.
 
     Both combine the estimator's own covariance, the model's error in free motion outside the fit and, in a log with
-    `free` windows, the uncertainty of the day's offset.  The filter's includes its lag; the smoother has none.  At
-    standstill both include friction, which takes any value up to the static level.
+    `free` windows, the uncertainty of the day's offset.  The filter's includes its lag, and the smoother's what it
+    rounds off a fast change.  At standstill both include friction, which takes any value up to the static level.
     """
 
     PUBLISHED = (
@@ -132,6 +132,7 @@ class Track(LogJointRecord):
     tau_ext_std_filter: Column
     tau_ext_smooth: Column
     tau_ext_smooth_std: Column
+    tau_ext_rounding: Column
     tau_ext_direct: Column
     innovation_q: Column
     innovation_dq: Column

@@ -10,8 +10,10 @@ An onset is modelled as a ramp of duration T that the smoother widens about its 
     onset = t(half the peak) - T/2,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
 A smoothed step has T = 0: it approaches both of its levels exponentially, with its steepest slope 1 / T_s in between.
-A push that rises like a squared sine begins T/4 before such a ramp.  Real pushes lie between the two, so the standard
-error of an onset contains, besides noise, the root mean square of what lies evenly between: T/4/sqrt(3).
+The peak of these shares is the median of what exceeds 3/4 of the largest sample, which noise raises; a ramp begins at
+the same time by either.  A push that rises like a squared sine begins .3 T before such a ramp.  Real pushes lie between
+the two, so the standard error of an onset contains, besides noise, the root mean square of what lies evenly between:
+.3 T/sqrt(3).  Noise in T counts as much as it could lengthen T, since near a step T is the root of a small difference.
 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
@@ -33,7 +35,7 @@ from davinci_forces.maths.signals.windows import runs
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
-SHAPE = 0.25 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
+SHAPE = 0.3 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
 STEP_WIDTH = 2.0 * float(np.log(2.0))  # T_seen of a step, in T_s
 TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
@@ -121,11 +123,14 @@ def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
 
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
     """Onset (inwards 1) or release (-1) of a contact above the level from `start` to `stop`, and its standard error."""
-    k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
+    k, inside = (start if inwards > 0 else stop - 1), size[start:stop]
+    peak = float(np.median(inside[inside >= 0.75 * inside.max()]))
     lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
     apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
-    duration = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0)))
-    return middle - 0.5 * inwards * duration, float(np.hypot(std[k] * apparent / peak, SHAPE * duration))
+    duration, crossing_std = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0))), std[k] * apparent / peak
+    longer = float(np.sqrt(duration**2 + 2.0 * apparent * (2.0 * 2.0**0.5 * crossing_std)))  # T_seen = 2 (t - t)
+    error = np.linalg.norm([crossing_std, SHAPE * duration, 0.5 * (longer - duration)])
+    return middle - 0.5 * inwards * duration, float(error)
 
 
 def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, rts
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
-from davinci_forces.filters.response import lag_error, noise_model, rise
+from davinci_forces.filters.response import lag_error, noise_model, rise, rounding_error
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
@@ -55,12 +55,17 @@ def track_effort(
     late = lag_error(parts, smoothed, noise)
     variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
+    smooth_rise = rise(rts.track, parts[0], noise)
+    rounding = np.concatenate([
+        rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
+        for part in segments(model.segment)
+    ])  # fmt: skip
     numbers |= {
         "model_part": model_part,
         "model_part_std": float(np.sqrt(model_part**2 + variance_std)) - model_part,
         "lag_part": rms(late[converged]),
         "smooth_part": rms(np.minimum(own, np.sqrt(variance))[converged]),
-        "smooth_rise": rise(rts.track, parts[0], noise),
+        "smooth_rise": smooth_rise,
     }
     for rows, estimate in blocks:
         part = model.part(rows)
@@ -87,7 +92,8 @@ def track_effort(
             tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late[rows] ** 2 + model_variance + offset.std**2 + friction),
             tau_ext_std_filter=estimate.tau_ext_std,
             tau_ext_smooth=smoothed[rows] - offset.value,
-            tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction),
+            tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction + rounding[rows] ** 2),
+            tau_ext_rounding=rounding[rows],
             tau_ext_direct=part.tau - part.tau_hat - offset.value,
             innovation_q=estimate.innovation_q,
             innovation_dq=estimate.innovation_dq,

@@ -36,7 +36,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
-        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, level, track.smooth_rise)
+        for event in events(track.t, *steady_effort(track), level, track.smooth_rise)
         if steady[np.searchsorted(track.t, event.onset).clip(0, len(steady) - 1)]
     ]
     pairs = match_windows(sorted(entry.contact), detected)
@@ -98,8 +98,7 @@ def contacts(
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     rows, above = [], []
     for window, event, stated in placed:
-        effort = track.tau_ext_smooth, track.tau_ext_smooth_std
-        summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
+        summary = summarise(track.t, steady_effort(track), window, free, track.smooth_rise, friction_std)
         if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.peak_std:
             event = None
         if summary is not None and (event or (stated and not track.at_rest)):
@@ -115,6 +114,11 @@ def contacts(
     )  # fmt: skip
     columns = dict(zip(names, np.array(rows).T, strict=True))
     yield Contact.like(threshold, log=track.log, above=np.array(above, np.int64), **columns)
+
+
+def steady_effort(track: Track) -> tuple[Array, Array]:
+    """The smoothed effort (N,) and its deviation (N,) without what is rounded off, which is added to that of a peak."""
+    return track.tau_ext_smooth, np.sqrt(track.tau_ext_smooth_std**2 - track.tau_ext_rounding**2)
 
 
 def unknown_friction(track: Track) -> Array:

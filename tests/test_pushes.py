@@ -1,0 +1,89 @@
+"""What is said of pushes of known shape: the band of the external effort, and the times of contact."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from davinci_forces.filters import ekf, rts
+from davinci_forces.filters.problem import NoiseModel, stationary_joint
+from davinci_forces.filters.response import rise, rounding_error, smallest_q_tau
+from davinci_forces.maths.contact.detection import events
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
+
+T_S, INERTIA, VISCOUS, START = 0.01, 0.3, 0.3, 10.0
+T = T_S * np.arange(2000)
+STARTS = NoiseModel(r_q=1e-5, r_dq=2e-3, q_q=0.0, q_dq=0.14 * T_S / INERTIA, q_tau=0.0)
+NOISE = STARTS._replace(q_tau=smallest_q_tau(ekf.track, INERTIA, VISCOUS, T_S, STARTS))
+SHAPES = {  # of the share of its duration that has passed
+    "step": np.ones_like,
+    "triangle": lambda x: 1.0 - np.abs(2.0 * x - 1.0),
+    "half-sine": lambda x: np.sin(np.pi * x),
+    "squared sine": lambda x: np.sin(np.pi * x) ** 2,
+    "ramp and hold": lambda x: np.minimum(np.minimum(x / 0.4, (1.0 - x) / 0.2), 1.0),
+}
+PUSHES = [("step", 4.0), ("step", 0.5), ("triangle", 2.0), ("triangle", 0.6), ("half-sine", 1.0), ("half-sine", 0.3)]
+PUSHES += [("squared sine", 1.0), ("squared sine", 0.5), ("ramp and hold", 4.0)]
+
+
+def push(shape, duration):
+    x = (T - START) / duration
+    return np.where((x >= 0.0) & (x <= 1.0), SHAPES[shape](x), 0.0)
+
+
+@cache
+def smoothed(shape, duration, peak, seed):
+    """The push (N,), the smoothed effort (N,), its deviation (N,), what is rounded off (N,), and the rise [s]."""
+    chance, true = np.random.default_rng(seed), peak * push(shape, duration)
+    joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, true + 0.14 * chance.normal(size=len(T)), T_S, 1.0)
+    q, dq = (std * chance.normal(size=len(T)) for std in (NOISE.r_q, NOISE.r_dq))
+    joint = joint._replace(q=q, dq=dq)
+    made, spread = rts.track(joint, NOISE), rise(rts.track, joint, NOISE)
+    return true, made.tau_ext, made.tau_ext_std, rounding_error(made.tau_ext, made.tau_ext_std**2, T_S, spread), spread
+
+
+@pytest.mark.parametrize("peak", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize(("shape", "duration"), PUSHES)
+def test_the_band_holds_pushes_and_is_hardly_wider_in_free_motion(shape, duration, peak):
+    """Without what is rounded off, it holds 2 to 99 % of the samples up to a tenth of a second beside a push."""
+    inside, wider = [], []
+    for seed in range(4):
+        true, effort, std, rounding, _ = smoothed(shape, duration, peak, seed)
+        near, free = np.abs(T - START - 0.5 * duration) < 0.5 * duration + 0.1, (T > 2.0) & (T < START - 2.0)
+        inside.append(np.abs(effort - true)[near] <= NORMAL_95 * np.hypot(std, rounding)[near])
+        wider.append(np.hypot(std, rounding)[free] / std[free])
+    assert np.mean(inside) > 0.9
+    assert np.mean(wider) < 1.05
+
+
+def test_a_rounded_step_and_a_rounded_tip_are_off_by_what_is_stated():
+    """Under exponential weights of either side, without noise: half of a step beside it, and .3 at a tip of slope 3."""
+    weights = np.exp(-np.abs(np.arange(-200, 201)) * T_S / 0.1)
+    for true, off in ((2.0 * (T >= START), 1.0), (3.0 * np.clip(1.0 - np.abs(T - START), 0.0, None), 0.3)):
+        rounded = np.convolve(true, weights / weights.sum(), "same")
+        k = int(np.abs(rounded - true)[500:-500].argmax()) + 500
+        assert np.abs(rounded - true)[k] == pytest.approx(off, rel=0.1)
+        assert rounding_error(rounded, np.zeros(len(T)), T_S, 0.2)[k] == pytest.approx(off, rel=0.1)
+
+
+def test_no_noise_is_taken_for_rounding_and_blocks_change_nothing(monkeypatch):
+    _, effort, std, rounding, spread = smoothed("half-sine", 1.0, 1.0, 0)
+    assert (rounding[(T > 2.0) & (T < 8.0)] == 0.0).mean() > 0.6
+    assert rounding_error(effort[:1], std[:1] ** 2, T_S, spread) == [0.0]
+    monkeypatch.setattr("davinci_forces.maths.arrays.BLOCK_SAMPLES", 150)
+    np.testing.assert_allclose(rounding_error(effort, std**2, T_S, spread), rounding, atol=1e-12)
+
+
+def test_times_of_contact_have_the_errors_that_are_stated():
+    """Over shapes and sizes; the errors of a step, whose duration of rise is the root of a small difference, too."""
+    z = []
+    for shape, duration in PUSHES:
+        for peak in (0.5, 1.0, 3.0):
+            for seed in range(4):
+                _, effort, std, _, spread = smoothed(shape, duration, peak, seed)
+                found = [e for e in events(T, effort, std, 4.0 * std.mean(), spread) if abs(e.onset - START) < 1.0]
+                z += [(e.onset - START) / e.onset_std for e in found]
+                z += [(e.release - START - duration) / e.release_std for e in found]
+    assert len(z) > 200
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.2
+    assert np.mean(np.abs(z) < NORMAL_95) > 0.9
