@@ -512,13 +512,16 @@ def test_the_alarm_level_is_that_of_rice_and_at_least_the_largest_effort():
     assert crossings == pytest.approx(28 / 20.0, rel=1e-12)
 
 
-def test_the_error_of_an_onset_is_noise_over_slope_and_the_shape_of_the_rise():
-    """A ramp of 0.8 s to a peak of 2, under noise whose deviation is stated: 0.05 of it lasts 0.8 s / 2."""
+def test_the_error_of_an_onset_is_noise_over_slope_the_shape_of_the_rise_and_noise_in_its_duration():
+    """A ramp of 0.8 s to a peak of 2, under noise whose deviation is stated; T_seen = 2 (t - t) has twice its noise."""
     ramp = 2.0 * np.clip((T - 5.0) / 0.8, 0.0, 1.0) * (T <= 20.0)
     for std in (0.0, 0.05, 0.5):
         [found] = events(T, ramp, np.full(len(T), std), 0.3, rise=0.0)
         assert found.onset == pytest.approx(5.0, abs=1e-9)
-        assert found.onset_std == pytest.approx(np.hypot(std * 0.8 / 2.0, 0.8 * 0.25 / np.sqrt(3)), rel=1e-9)
+        crossing = std * 0.8 / 2.0
+        longer = np.sqrt(0.8**2 + 2 * 0.8 * 2 * np.sqrt(2) * crossing)
+        expected = np.linalg.norm([crossing, 0.3 * 0.8 / np.sqrt(3), 0.5 * (longer - 0.8)])
+        assert found.onset_std == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_no_mean_reduces_is_in_the_error_of_a_mean_as_it_is():

@@ -450,7 +450,9 @@ def test_a_long_log_is_predicted_and_filtered_in_blocks_as_the_whole(identified,
         (columns, numbers), (expected_columns, expected_numbers) = in_blocks(made), in_blocks([expected])
         assert numbers == expected_numbers
         for name, column in columns.items():
-            np.testing.assert_array_equal(column, expected_columns[name], name)
+            # Rounding is off by running sums of 10^4 efforts about 1, which begin anew in each block.
+            close = 1e-11 if name in ("tau_ext_rounding", "tau_ext_smooth_std") else 0.0
+            assert_allclose(column, expected_columns[name], rtol=0.0, atol=close, err_msg=name)
 
 
 def test_the_variance_of_a_band_has_twice_the_relative_error_of_its_deviation():
