@@ -26,7 +26,7 @@ from davinci_forces.runner.fingerprints.code import code
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "pipeline/davinci_forces"
-ROOMS = ("maths", "stages", "filters", "estimators", "report/sections")
+ROOMS = ("maths", "stages", "filters", "estimators", "identification", "report/sections")
 SWAPS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
