@@ -119,6 +119,15 @@ def test_what_a_remark_says_to_write_leaves_nothing_to_remark_on(at, key):
     assert after.period == pytest.approx(before.period, rel=1e-12)
 
 
+@pytest.mark.parametrize(("duration", "severity"), [(2.5, "note"), (10.0, "note"), (15.0, "warning")])
+def test_a_run_in_as_excite_designs_it_is_a_note_unless_it_lasts_a_period(duration, severity):
+    s = np.arange(round(duration * RATE)) / RATE / duration
+    phase = duration * (s**4 * (2.5 - 3 * s + s**2) - 0.5)  # along the same path, from rest to full speed at 0
+    signal = moved(np.concatenate([phase, np.arange(4000) / RATE]))
+    records = average.run([signal], entry(), arm.ARM, harmonics=0, lowpass=17.0)
+    assert [list(record.severity) for record in records if isinstance(record, Diagnostic)] == [[severity]]
+
+
 @pytest.mark.parametrize("T", [7.37, 13.1, 30.2])
 @pytest.mark.parametrize("periods", [2.0, 2.05, 2.6, 6.3, 200.0])
 def test_two_whole_periods_are_enough(T, periods):

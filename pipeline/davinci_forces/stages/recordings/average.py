@@ -61,7 +61,7 @@ def run(
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
     agreeing, length, differing = agreeing_stretch(t, positions, columns, periodic, length, rate, max_harmonics)
-    remarks += omissions(moving[0], periodic, agreeing, length, [(names[d.signal], d) for d in differing])
+    yield from omissions(moving[0], periodic, agreeing, length, [(names[d.signal], d) for d in differing])
     std = standard_error(t[agreeing], [x[agreeing] for x in positions], length, max_harmonics)
     period, period_remarks = reconcile_period(Period(length, std), entry)
     remarks += period_remarks
@@ -150,14 +150,17 @@ def multiples(length: float, stated: float | None, periods: int) -> list[int]:
 
 def omissions(
     first: Signal, periodic: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
-) -> list[str]:
-    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out."""
-    t = first.t
+) -> Iterator[Diagnostic]:
+    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out.
+
+    A run-in or a stop of at most a period is expected, so it is a note.
+    """
+    t, gaps = first.t, gaps_at(first, periodic)
     sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (periodic.start > 0)
     sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
     faults = []
     if sides:
-        what = f"as in a stop, a ramp or another motion{gaps_at(first, periodic)}"
+        what = f"as in a stop, a ramp or another motion{gaps}"
         faults.append(f"{' and '.join(sides)} do not repeat, {what}")
     for name, d in differing:
         inside = d.has_periods_on_both_sides
@@ -173,7 +176,11 @@ def omissions(
     evaluated = f"{'only ' if keys else ''}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
     advice = f"; to confirm this, write {' and '.join(keys)} in study.toml" if keys else ""
     repeats = f"{first.log}: joints repeat every {length:.4f} s"
-    return [f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"] if faults else []
+    short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) <= length + 1.0 / first.rate
+    expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
+    if faults:
+        text = f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"
+        yield diagnostic("average", first.log, "note" if expected else "warning", text)
 
 
 def gaps_at(signal: Signal, periodic: slice) -> str:
