@@ -8,6 +8,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from davinci_forces import guide
 from davinci_forces.records import (
     KINDS,
     Average,
@@ -247,6 +248,12 @@ def test_coulomb_friction_may_be_negative_beside_presliding_friction_that_outwei
     theta[other] = 0.1
     [verdict] = joints.implausible([replace(fit, theta=theta, **values)], fit.group)
     assert verdict.text.startswith("**Coulomb friction** is negative")
+
+
+def test_the_guide_explains_each_column_of_the_table_on_page_one(full: Context):
+    table = summary.trust_table(full, [replace(trust, sought=0.5) for trust in trusts(full, hand_roll=0.05)])
+    for head in table.header:
+        assert guide.page(head.strip("$")).topic == "terms"
 
 
 def trusts(full: Context, **shares: float) -> list[Trust]:
