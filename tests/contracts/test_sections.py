@@ -391,6 +391,16 @@ def test_details_of_a_joint_are_those_of_least_squares_in_whichever_order_its_fi
     assert [*map(repr, one)] == [*map(repr, other)]
 
 
+def test_a_fault_of_a_candidate_stands_beside_the_fits_and_not_on_page_one(full: Context, catalogue: Catalogue):
+    fits = [fit for fit in full.own_fits() if fit.group == "hand_roll"]
+    remark = diagnostic("fit", "hand_roll", "note", "hand_roll: lse estimates an inertia that is not positive")
+    records = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
+    about = replace(full, catalogue=records)
+    [bullets] = [block for block in joints.comparison(about, fits).blocks if isinstance(block, Bullets)]
+    assert bullets.items == (remark.text[0],)
+    assert not any("inertia" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05)))
+
+
 def test_the_middle_of_a_log_is_drawn_of_filters_that_are_compared(full: Context):
     [compared, *_] = full.catalogue.records(Comparison)
     t = 100.0 + np.arange(3000) / 50.0

@@ -225,7 +225,7 @@ def consistent_fits(
             consistent = fit_consistent(part, free)
         except (NotIdentifiable, np.linalg.LinAlgError) as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
-            yield diagnostic("choose", model.group, "warning", message)
+            yield diagnostic("choose", model.group, "note", message)
             continue
         yield fit_record(candidate, "consistent", part, consistent.estimate)
         if consistent.excess > NEGLIGIBLE_EXCESS:
