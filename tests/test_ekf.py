@@ -253,7 +253,7 @@ def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
     fits = [r for r in made if isinstance(r, Fit)]
     (text,) = [text for diagnostic in arm.models([signal], fits) for text in diagnostic.text]
     assert "the inertia of independent.lse is not positive" in text
-    assert "the remarks of stage fit on hand_roll say why" in text
+    assert "the report may name the cause beside all fits of hand_roll" in text
     assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
 
 

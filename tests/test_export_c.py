@@ -161,7 +161,7 @@ def test_bad_input_changes_nothing_and_a_gap_restarts(model):
     assert compiled.step(0, 0.02, *good) == OK
     fast = [[9.5, 0, 0] if k == 1 else zero for k in range(3)]
     assert compiled.step(0, 0.03, *good[:3], *fast) == OUTSIDE
-    assert compiled.step(0, 0.04, 61.0, *good[1:]) == OUTSIDE
+    assert compiled.step(0, 0.04, 61.0, *good[1:]) == OK  # a push raises the effort beyond that of free motion
     uncertain = compiled.result.std_filter
     assert compiled.step(0, 0.10, *good) == OK
     assert compiled.result.std_filter == pytest.approx(0.7) != uncertain

@@ -119,6 +119,20 @@ def test_what_a_remark_says_to_write_leaves_nothing_to_remark_on(at, key):
     assert after.period == pytest.approx(before.period, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("duration", "rest", "severity"),
+    [(2.5, 0.0, "note"), (2.5, 1.3, "note"), (10.0, 9.0, "note"), (10.0, 15.0, "warning")],
+)
+def test_a_rest_and_a_run_in_as_excite_designs_it_cost_no_period_and_no_warning(duration, rest, severity):
+    s = np.arange(round(duration * RATE)) / RATE / duration
+    phase = duration * (s**4 * (2.5 - 3 * s + s**2) - 0.5)  # along the same path, from rest to full speed at 0
+    u = np.concatenate([np.full(round(rest * RATE), phase[0]), phase, np.arange(5000) / RATE])
+    signal = moved(3.1 + u)  # from this place on, the slow part of a run-in repeats best, if samples are averaged
+    records = list(average.run([signal], entry(), arm.ARM, harmonics=0, lowpass=17.0))
+    assert [record.periods for record in records if isinstance(record, Average)] == [5]
+    assert [list(record.severity) for record in records if isinstance(record, Diagnostic)] == [[severity]]
+
+
 @pytest.mark.parametrize("T", [7.37, 13.1, 30.2])
 @pytest.mark.parametrize("periods", [2.0, 2.05, 2.6, 6.3, 200.0])
 def test_two_whole_periods_are_enough(T, periods):

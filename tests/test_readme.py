@@ -355,6 +355,21 @@ def test_terms_are_in_order_and_each_once():
     assert terms == sorted(set(terms))
 
 
+PAGE_ONE = (
+    "Verdict", "New path", "Model error", "Error/effort", "R2", "Ceiling", "Detection level", "Sought", "Coverage",
+    "95 % band", "caution", "same path", "at rest", "too narrow", "too wide", "external effort", "free space", "run",
+    "stated window", "alarm level", "standard error", "stiffness", "quartiles",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("term", PAGE_ONE)
+def test_the_guide_explains_every_term_of_page_one(term):
+    page = guide.page(term)
+    assert page.topic == "terms"
+    assert term.lower() in page.text.lower()
+    assert len(page.text) < 400
+
+
 @pytest.mark.parametrize(("topic", "meant"), [("review", "compare"), ("labveiw", "labview")])
 def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_spelled_alike(topic, meant):
     with pytest.raises(BadRequest, match=f"did you mean {meant}"):

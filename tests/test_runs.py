@@ -196,6 +196,14 @@ def test_several_warnings_of_a_run_are_printed_once_more_at_its_end(capsys):
         *(f"  {line}" for line in warnings[: runs.MAX_REPEATED]),
         "  and 2 more, above",
     ]
+    alike = [f"resample: warning: log-{i}/roll: it stands still from {i} s" for i in range(3)]
+    made.warnings = [*alike, warnings[0], "report: error: review.toml:3: right above"]
+    runs.print_results(made, Path("raw/a"))
+    assert capsys.readouterr().err.splitlines() == [
+        "the 4 warnings of this run once more:",
+        f"  {alike[0]} (2 more remarks of this kind)",
+        f"  {warnings[0]}",
+    ]
     made.warnings = warnings[:1]
     runs.print_results(made, Path("raw/a"))
     assert not capsys.readouterr().err

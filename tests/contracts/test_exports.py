@@ -342,14 +342,16 @@ def test_of_fits_the_urdf_takes_the_one_with_which_it_errs_least_and_says_what_i
         assert all(line in text for text in files.values() for line in remarks)
 
 
+@pytest.mark.parametrize("std", [0.1, 0.3])
 @pytest.mark.parametrize("name", sorted(set(FORMATS) - {"urdf"}))
-def test_a_negative_spring_or_friction_is_remarked_on_and_a_negative_offset_is_not(name, small):
+def test_a_negative_spring_or_friction_is_remarked_on_and_a_negative_offset_is_not(name, std, small):
+    """A spring is, if it is beyond its 95 % error."""
     joint = small.joints[0]
     for term in joint.model.terms:
         theta = np.where([str(p) == term.name for p in joint.fit.parameter], -0.5, np.abs(joint.fit.theta))
-        joints = (joint._replace(fit=replace(joint.fit, theta=theta)),)
+        joints = (joint._replace(fit=replace(joint.fit, theta=theta, theta_std=np.full(len(theta), std))),)
         files, remarks = renderer(name)(replace(small, joints=joints))
-        assert len(remarks) == int(term.positive or term.name == "stiffness")
+        assert len(remarks) == int(term.positive or (term.name == "stiffness" and std < 0.2))
         for line in remarks:
             assert f"{term.name} is negative, -0.5 +- " in line
             assert all(line in text for text in files.values())

@@ -8,6 +8,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from davinci_forces import guide
 from davinci_forces.records import (
     KINDS,
     Average,
@@ -251,6 +252,12 @@ def test_coulomb_friction_may_be_negative_beside_presliding_friction_that_outwei
     assert verdict.text.startswith("**Coulomb friction** is negative")
 
 
+def test_the_guide_explains_each_column_of_the_table_on_page_one(full: Context):
+    table = summary.trust_table(full, [replace(trust, sought=0.5) for trust in trusts(full, hand_roll=0.05)])
+    for head in table.header:
+        assert guide.page(head.strip("$")).topic == "terms"
+
+
 def trusts(full: Context, **shares: float) -> list[Trust]:
     """The trust in joints whose models err by these shares of the effort, on a path that no fit had seen."""
     p, space = full.catalogue.records(Prediction)[0], full.catalogue.records(FreeSpace)[0]
@@ -384,6 +391,16 @@ def test_details_of_a_joint_are_those_of_least_squares_in_whichever_order_its_fi
     [(_, *one), (_, *other)] = (joints.comparison(full, order).blocks for order in (fits, fits[::-1]))
     assert one
     assert [*map(repr, one)] == [*map(repr, other)]
+
+
+def test_a_fault_of_a_candidate_stands_beside_the_fits_and_not_on_page_one(full: Context, catalogue: Catalogue):
+    fits = [fit for fit in full.own_fits() if fit.group == "hand_roll"]
+    remark = diagnostic("fit", "hand_roll", "note", "hand_roll: lse estimates an inertia that is not positive")
+    records = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
+    about = replace(full, catalogue=records)
+    [bullets] = [block for block in joints.comparison(about, fits).blocks if isinstance(block, Bullets)]
+    assert bullets.items == (remark.text[0],)
+    assert not any("inertia" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05)))
 
 
 def test_the_middle_of_a_log_is_drawn_of_filters_that_are_compared(full: Context):

@@ -12,7 +12,17 @@ from numpy.testing import assert_allclose
 from davinci_forces.exports import renderer
 from davinci_forces.exports.identified import export_of
 from davinci_forces.filters import ekf, online
-from davinci_forces.filters.online import BAD_INPUT, STARTING, LinkTree, OnlineJoint, Stream, Window, delay_of
+from davinci_forces.filters.online import (
+    BAD_INPUT,
+    OK,
+    OUTSIDE_VALIDITY,
+    STARTING,
+    LinkTree,
+    OnlineJoint,
+    Stream,
+    Window,
+    delay_of,
+)
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.used import Identified
@@ -156,13 +166,18 @@ def test_a_window_passes_half_at_the_cutoff(rate):
 def test_contacts_and_standstill_are_told(small):
     stream = Stream(small.document())
     n, filters = len(stream.coordinates), stream.filters
+    rest = [sum(f.valid[0]) / 2.0 for f in filters]
     for k in range(400):
-        estimate = stream.step(k * T_S, np.full(n, 0.1), np.zeros(n))
+        estimate = stream.step(k * T_S, rest, np.zeros(n))
     still = [f.static for f in filters]
     assert (estimate.std**2 >= np.array(still) ** 2 / 3.0).all()
     for k in range(400, 900):
-        estimate = stream.step(k * T_S, np.full(n, 0.1), np.full(n, 50.0))
+        estimate = stream.step(k * T_S, rest, np.full(n, 50.0))
     assert (estimate.contact[[f.alarm is not None for f in filters]] == 1).all()
+    assert estimate.status == (OK,) * len(filters)  # a push raises the effort, and the motion stays that of the study
+    for k in range(900, 1000):
+        estimate = stream.step(k * T_S, np.full(n, 40.0), np.zeros(n))
+    assert estimate.status == (OUTSIDE_VALIDITY,) * len(filters)
 
 
 def test_the_package_for_ros_is_the_same_core(small, tmp_path):

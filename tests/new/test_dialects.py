@@ -208,6 +208,7 @@ def test_joints_in_another_order_go_by_their_names_where_a_robot_has_them(tmp_pa
 FOLDERS = {
     "identification/run.csv": "identification", "validation/run.csv": "validation", "contact/run.csv": "contact",
     "free motion/run_2.csv": "validation", "payload/run_500g.csv": "weight", "Friction/run_3.csv": "friction",
+    "payload/run_4.csv": "weight",
 }  # fmt: skip
 
 
@@ -222,6 +223,7 @@ def test_words_of_folders_and_files_tell_the_role_whatever_the_channels_say(tmp_
     text = (tmp_path / "study.toml").read_text()
     assert 'role = "contact"  # "contact" in its name' in text
     assert "# weight = { mass = 0.5, " in text
+    assert '# weight = { mass = "<kg, if known>", moves_with' in text
 
 
 def test_stillness_and_outliers_of_the_effort_tell_contact_whatever_the_channels_say(tmp_path):

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,11 +18,13 @@ from matplotlib.textpath import TextPath
 from report_documents import HOSTILE, still, zoomable
 
 from davinci_forces.report import writers
-from davinci_forces.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Tiles, walk
+from davinci_forces.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Points, Tiles, walk
+from davinci_forces.report.figures.palette import COLOURS
 from davinci_forces.report.figures.panels import wrap_label
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.figures.ticks import power_of_ten
 from davinci_forces.report.writers import html, pdf
+from davinci_forces.report.writers.pictures import shrink
 
 
 def test_every_mark_is_drawn_into_well_formed_svg_of_the_width_of_the_page(full: Document) -> None:
@@ -180,6 +183,17 @@ def test_importing_the_content_imports_no_drawing_catalogue() -> None:
     root = str(Path(__file__).parents[2])
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=root)
     assert result.stdout.strip() == "[]"
+
+
+def test_the_name_of_a_point_is_readable_on_a_line() -> None:
+    """A halo in the colour of the page lies between the line and the letters, on a light page and on a dark one."""
+    x = np.linspace(0.0, 1.0, 50)
+    marks = (Line(x, np.ones(50), "effort"), Points(x[:1], np.ones(1), names=("+2.08",)))
+    picture = svg(Figure("F", "f", (Panel("", "time [s]", "y", marks),)))
+    [style] = re.findall(r'<text [^>]*style="([^"]*)">\+2\.08<', picture)
+    assert f"paint-order: stroke; stroke: {COLOURS['paper']}; stroke-width: 2.5" in style
+    assert picture.index("+2.08") > picture.index("<path")
+    assert "stroke:var(--paper)" in shrink(picture)
 
 
 def test_a_matrix_is_tiles_with_their_numbers_and_names() -> None:

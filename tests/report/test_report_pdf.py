@@ -174,6 +174,22 @@ def test_a_name_stays_whole_while_a_header_can_take_lines() -> None:
     assert text.count("−1.250 ± 0.010") == 6
 
 
+@poppler
+def test_no_number_breaks_where_words_have_to() -> None:
+    """As on page one, if a joint has a long name and its numbers a power of ten and a unit of two letters."""
+    numbers = [Number(4.38e-6 * 10**i, unit, 4.5e-7) for i, unit in enumerate(("N m", "N"))]
+    cells = ("100 %", "14 %", "82 %, too narrow", "0.8016 ± 0.0052", "0.8343")
+    rows = tuple(
+        ("shoulder_lift_joint", "Small error, narrow band, at rest", *cells, number, number, number)
+        for number in numbers
+    )
+    header = ("Joint", "Verdict", "New path", "Error", "Coverage", "R2", "Ceiling", "Model error", "Level", "Sought")
+    table = Table("Trust.", header, rows, align="ll" + "r" * 8)
+    text = read(pdf.render(one(table))).replace("\N{NO-BREAK SPACE}", " ")
+    for words, times in ((cells[0], 2), (cells[1], 2), (cells[2], 2), (cells[3], 2), *((str(n), 3) for n in numbers)):
+        assert text.count(words) == times, words
+
+
 def test_the_file_says_what_it_is_of_whom_and_on_what() -> None:
     made = replace(one(Prose("text")), author="A Laboratory", keywords=("friction", "da Vinci"), edition="report ID 77")
     source = pdf.render(made)

@@ -414,4 +414,7 @@ def test_of_an_arm_of_more_than_three_joints_no_force_at_the_tip_is_made_up():
     arm = replace(DAVINCI, joints=robot(writing.text(DAVINCI)).joints)
     touched = LogEntry(name="touch", files=("a.csv",), role="contact", channels=())
     [said] = resolve.apply([], [], [], touched, arm)
-    assert "touch: no force at the tip: davinci has 7 joints, and it is computed only for arms of 3" in said.text[0]
+    assert (
+        "touch: no force at the tip: davinci has 7 joints, and the efforts of more than 3 also hold a moment"
+        in said.text[0]
+    )

@@ -11,7 +11,7 @@ DEFAULT_FILE = Path("davinci-forces-guide.html")
 
 
 def run(
-    topic: Annotated[str | None, typer.Argument(help="Topic to show; without one, the list of topics.")] = None,
+    topic: Annotated[str | None, typer.Argument(help="Topic or term to show; without one, the list of topics.")] = None,
     html: Annotated[
         bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")
     ] = False,
@@ -32,4 +32,4 @@ def run(
 
     file = out or DEFAULT_FILE
     write_bytes(file, render().encode())
-    echo(f"see {file}{f'#{topic}' if topic else ''}")
+    echo(f"see {file}{f'#{page.topic}' if page else ''}")

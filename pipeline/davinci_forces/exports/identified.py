@@ -22,7 +22,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, coulomb, inertia, offset, stiffness
-from davinci_forces.maths.uncertainty.error_band import calibrate
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95, calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.prediction import CHOSEN
@@ -31,7 +31,8 @@ from davinci_forces.study import Study
 
 SAFETY = "research use, not a medical device; try at reduced effort with the stop in hand"
 SOLVER_ZERO = 1e-9  # largest size of a parameter that a solver means as 0
-FREE_ROLES = ("identification", "validation")  # of logs without contact, whose motion and effort bound the validity
+FREE_ROLES = ("identification", "validation")  # of logs without contact, whose motion bounds the validity
+VALID = "valid in the range of position and velocity of free motion (contact adds to its effort):"
 DRIVE = (inertia, stiffness, offset)  # terms of a coupled joint's drive and cables, in the order of `coupled.ADDED`
 STATIC = {"1", "sin q", "cos q", "q", "q^2", "q^3", "sin 2q", "cos 2q", "sin 3q", "cos 3q"}  # hold a resting arm
 UNITS = {"position": "{position}", "velocity": "{position}/s", "effort": "{effort}"}
@@ -87,7 +88,7 @@ class Export:
         lines = [f"davinci-forces {origin.version}, report ID {origin.report_id}", f"study {study.name}: {study.title}"]
         lines += ["SIMULATED: the logs of this study are simulated"] * study.simulated
         lines += [SAFETY, *(f"exported despite: {reason}" for reason in origin.despite)]
-        lines += ["SI units: rad, m, s, kg, N m, N; A where the effort is a motor current", "valid in the range of:"]
+        lines += ["SI units: rad, m, s, kg, N m, N; A where the effort is a motor current", VALID]
         for joint in self.joints:
             units = (joint.joint.unit(unit) for unit in UNITS.values())
             ranges = zip(UNITS, joint.validity.values(), units, strict=True)
@@ -101,8 +102,9 @@ class Export:
         return [visible(line) for line in lines]
 
     def remarks(self) -> list[str]:
-        """Name negative springs, and other negative parameters that physics makes positive; Coulomb friction if its sum
-        with presliding friction is negative.
+        """Name springs that are negative beyond their error, and negative parameters that physics makes positive.
+
+        Coulomb friction is named if its sum with presliding friction is negative.
         """
         advice = "in a simulation or a compensation it can drive the joint"
         return [
@@ -111,7 +113,8 @@ class Export:
             for about, name, value, std, unit in zip(
                 terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
             )
-            if value < -SOLVER_ZERO and about.term and (about.term.positive or about.term == stiffness)
+            if about.term and (about.term.positive or about.term == stiffness)
+            if value < (-NORMAL_95 * std if about.term == stiffness else -SOLVER_ZERO)
             if about.term != coulomb or sliding_friction(fit, model, about.joint) < 0.0
         ]
 

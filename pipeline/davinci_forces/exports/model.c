@@ -162,7 +162,6 @@ df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
     GUARD(in->q, in->dq, in->ddq)
     const df_real y[4] = {in->q_measured, in->dq_measured, in->tau, in->t}, q = in->q[m->row], dq = in->dq[m->row];
     FOR(i, 4) if (!isfinite(y[i]) || (s->runs && in->t <= s->t)) return DF_BAD_INPUT;
-    if (in->tau < m->range[2][0] || in->tau > m->range[2][1]) status = DF_OUTSIDE_VALIDITY;
     if (!s->runs || in->t - s->t > 1.5 * m->T) {
         const df_state first = {1, 0, {0}, {y[0], y[1], 0, 1e6 * m->R[0], 0, 0, 1e6 * m->R[1], 0, m->start * m->start}};
         *s = first;

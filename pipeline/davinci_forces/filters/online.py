@@ -232,7 +232,7 @@ class OnlineJoint:
         for p in parameters:
             if p["role"] == "link":
                 self.bodies[links.names.index(p["link"]), INERTIAL.index(p["inertial"])] = p["value"]
-        self.valid = [joint["validity"][name] for name in ("position", "velocity", "effort")]
+        self.valid = [joint["validity"][name] for name in ("position", "velocity")]  # a contact adds to the effort
         self.R, Q = tuned["R"], tuned["Q"]
         self.Q = Q[0][0], Q[0][1], Q[1][1], Q[2][2]
         self.T_s, self.initial_std = 1.0 / tuned["rate"], tuned["initial_std"]
@@ -393,7 +393,7 @@ class Stream:
             tau_ext -= self.offset[i]
             level = -1 if joint.alarm is None else int(abs(tau_ext) > joint.alarm + static)
             rows.append((motion[0], motion[1], tau_hat, tau_ext, math.sqrt(std**2 + static**2 / 3.0), level))
-            inside = all(low <= x <= high for x, (low, high) in zip((*motion[:2], tau[row]), joint.valid, strict=True))
+            inside = all(low <= x <= high for x, (low, high) in zip(motion[:2], joint.valid, strict=True))
             status.append(OK if inside else OUTSIDE_VALIDITY)
         values, contact = np.array([row[:5] for row in rows]).T, np.array([row[5] for row in rows], np.int64)
         force = self._force(values[0], values[3])

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ GROUPS = {  # folder -> its heading, in the order of the list
     "": "The project",
     "changes": "Changes, by version",
 }
-INDEX = "index"  # topic of the page that lists the others
+INDEX, TERMS = "index", "terms"  # topics of the page that lists the others, and of that which explains terms
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.md(?:#([\w-]+))?\)")  # to a page, perhaps to a heading
 COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 
@@ -58,17 +58,24 @@ def pages() -> tuple[Page, ...]:
 
 
 def page(topic: str) -> Page:
-    """The page of a topic.
+    """The page of a topic, or what the page of terms says of a term.
 
     Raises
     ------
     BadRequest
-        If there is no such topic; the message names those that are spelled most alike.
+        If there is neither; the message names the topics that hold these words, or are spelled most alike.
     """
     by_topic = {page.topic: page for page in pages()}
+    words = rf"(?<!\w){re.escape(topic)}s?(?!\w)"
+    rows = re.findall(rf"(?mi)^\| ([^|]*{words}[^|]*) \|(.*)\|$", by_topic[TERMS].text)
+    rows = rows or re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text)
+    if topic not in by_topic and rows:
+        return replace(by_topic[TERMS], write=lambda: "\n\n".join(f"**{term}**:{means}" for term, means in rows))
     if topic not in by_topic:
         titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
-        close = titled[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
+        times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
+        holding = sorted(filter(times.get, times), key=times.__getitem__, reverse=True)
+        close = titled[:3] or holding[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
         meant = f"did you mean {' or '.join(close)}? " if close else ""
         raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
     return by_topic[topic]
@@ -76,7 +83,11 @@ def page(topic: str) -> Page:
 
 def contents() -> str:
     """The list of topics as Markdown, by group, each with its summary."""
-    lines = ["# davinci-forces: the guide", "", "`davinci-forces guide TOPIC` shows a page."]
+    lines = [
+        "# davinci-forces: the guide",
+        "",
+        "`davinci-forces guide TOPIC` shows a page, or explains a term of the report.",
+    ]
     for folder, heading in GROUPS.items():
         listed = [page for page in pages() if page.folder == folder]
         lines += (

@@ -39,6 +39,7 @@ from davinci_forces.records.record import (
     Origin,
     Record,
     diagnostic,
+    first_of_each_kind,
 )
 from davinci_forces.records.recordings import (
     Average,
@@ -74,7 +75,7 @@ __all__ = [
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
     "TipBudget", "TipContact", "TipForce", "TissueModel", "TorqueConstant", "Touch", "Track", "Trajectory",
-    "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic", "first_of_each_kind",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {

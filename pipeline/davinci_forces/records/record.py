@@ -11,7 +11,7 @@ prefix itself.  With `{row}` (its number from 1), `{name}` or `{slug}` in the pr
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 from weakref import WeakValueDictionary
@@ -240,6 +240,16 @@ class Diagnostic(Record):
     subject: str
     severity: Labels
     text: Labels
+
+
+def first_of_each_kind(remarks: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Yield the first of the remarks (stage, text) that begin alike after the log's name, and count the others."""
+    kinds: dict[tuple[str, ...], list[str]] = {}
+    for stage, text in remarks:
+        kinds.setdefault((stage, *(text.partition(": ")[2] or text).split()[:3]), []).append(text)
+    for (stage, *_), (first, *others) in kinds.items():
+        more = f" ({len(others)} more remark{'s' * (len(others) > 1)} of this kind)" if others else ""
+        yield stage, first + more
 
 
 def diagnostic(stage: str, subject: str, severity: str, *texts: str) -> Diagnostic:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.files import read_bytes, text_of
+from davinci_forces.records import first_of_each_kind
 from davinci_forces.report import REPORT
 from davinci_forces.runner.console import Verbosity, console, durations, echo
 from davinci_forces.runner.ledger import Folders
@@ -172,12 +173,14 @@ def print_results(runner: Runner, folder: Path) -> None:
         runner.console.say(text_of(read_bytes(runner.folders.reports / "summary.txt")).rstrip())
     if runner.ran:
         runner.console.say(durations(runner.seconds))
-    if len(runner.warnings) > 1:
-        runner.console.warn(f"the {len(runner.warnings)} warnings of this run once more:")
-        for line in runner.warnings[:MAX_REPEATED]:
-            runner.console.warn(f"  {line}")
-        if len(runner.warnings) > MAX_REPEATED:
-            runner.console.warn(f"  and {len(runner.warnings) - MAX_REPEATED} more, above")
+    earlier = [line for line in runner.warnings if not line.startswith(f"{REPORT}: ")]  # those are right above
+    if len(earlier) > 1:
+        runner.console.warn(f"the {len(earlier)} warnings of this run once more:")
+        remarks = ((": ".join(stage), text) for *stage, text in (line.split(": ", 2) for line in earlier))
+        lines = [f"  {stage}: {text}" for stage, text in first_of_each_kind(remarks)]
+        more = [f"  and {len(lines) - MAX_REPEATED} more, above"] if lines[MAX_REPEATED:] else []
+        for line in (*lines[:MAX_REPEATED], *more):
+            runner.console.warn(line)
     for file in ("report.html", "report.pdf", "robot.html", "results.json"):
         if f"reports/{file}" in files:
             runner.console.say(f"{folder}: see {runner.folders.reports / file}")

@@ -312,8 +312,8 @@ class _Writer:
             return
         yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
         if self.role.role == "weight":
-            mass = f"mass = {self.role.mass:g}, " if self.role.mass else ""
-            yield f'# weight = {{ {mass}moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # where the mass hangs'
+            mass = f"{self.role.mass:g}" if self.role.mass else '"<kg, if known>"'
+            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # its place [m]'
 
     def _rate(self) -> Iterator[str]:
         timing, tissue = self.draft.guess.timing, bool(self.draft.touching)

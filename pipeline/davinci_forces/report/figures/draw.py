@@ -128,7 +128,7 @@ def draw_points(mark: Points, frame: Frame) -> str:
     far = frame.left + 0.88 * frame.width
     for a, b, name in zip(x.tolist(), y.tolist(), mark.names, strict=False):
         shift, anchor = (-BESIDE, "end") if a > far else (BESIDE, "start")
-        svg += words(a + shift, b + 0.35 * SMALL_SIZE, name, colour, SMALL_SIZE, anchor)
+        svg += words(a + shift, b + 0.35 * SMALL_SIZE, name, colour, SMALL_SIZE, anchor, halo=COLOURS["paper"])
     return svg
 
 

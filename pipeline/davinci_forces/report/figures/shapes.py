@@ -61,12 +61,13 @@ def path(d: str, style: str) -> str:
 
 def words(
     x: float, y: float, text: str, colour: str, size: float = NORMAL_SIZE, anchor: str = "start", bold: bool = False,
-    turned: bool = False,
+    turned: bool = False, halo: str = "",
 ) -> str:  # fmt: skip
-    """One line of words, with its baseline at y [pt]; `turned` ones run upwards."""
+    """One line of words, with its baseline at y [pt]; `turned` ones run upwards, a `halo` covers lines behind them."""
     if not text:
         return ""
     weight = "; font-weight: bold" if bold else ""
+    weight += f"; paint-order: stroke; stroke: {halo}; stroke-width: 2.5; stroke-linejoin: round" if halo else ""
     turn = f' transform="rotate(-90 {x:.2f} {y:.2f})"' if turned else ""
     style = f"font-size: {size:g}px; font-family: {WORDS_FONT}; text-anchor: {anchor}; fill: {colour}{weight}"
     return f'<text x="{x:.2f}" y="{y:.2f}"{turn} style="{style}">{escape(text, quote=False)}</text>'

@@ -46,7 +46,7 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The force at the tip of every log in which all joints that carry it move."""
     yield Prose(
         "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
-        "from the external efforts of the first three joints, at times when all of them move. Two assumptions are "
+        "from the external efforts of the three joints, at times when all of them move. Two assumptions are "
         "made: nothing but the tip is touched, and the wrist is straight. The efforts are those of the smoother, which "
         "has no delay. Their covariance $C_tau$ contains the squares of their standard deviations."
     )

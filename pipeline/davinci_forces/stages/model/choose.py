@@ -77,7 +77,8 @@ def run(
     yield from (search_record(search, is_used(search, selection.chosen)) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
-        yield diagnostic("choose", "arm", "warning", f"{message}; the remarks of stage fit on each inertia say why")
+        where = "the report may name the cause beside all fits of each joint"
+        yield diagnostic("choose", "arm", "warning", f"{message}; {where}")
     shown = (*best_of_structures(fixed), *best_of_setting(fixed, fit))
     by_name = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
     by_variant = {c.variant: name for name, c in by_name.items()}
@@ -225,7 +226,7 @@ def consistent_fits(
             consistent = fit_consistent(part, free)
         except (NotIdentifiable, np.linalg.LinAlgError) as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
-            yield diagnostic("choose", model.group, "warning", message)
+            yield diagnostic("choose", model.group, "note", message)
             continue
         yield fit_record(candidate, "consistent", part, consistent.estimate)
         if consistent.excess > NEGLIGIBLE_EXCESS:

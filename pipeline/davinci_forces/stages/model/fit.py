@@ -192,9 +192,10 @@ def identifiability(
         verb = "estimates" if len(wrong) == 1 else "estimate"
         why = why_not_positive(robot, joint, estimate, excitation, others)
         message = f"{model.group}: {join_names(wrong)} {verb} an inertia that is not positive: {why}"
-        yield diagnostic("fit", model.group, "warning", message)
+        yield diagnostic("fit", model.group, "note", message)  # `predict` warns if this model is used
     if message := hardly_described(joint, r_squared(regression, plain), others):
-        yield diagnostic("fit", model.group, "warning", f"{model.group}: {message}")
+        severity = "note" if others else "warning"  # with others, a model of the whole arm may be used
+        yield diagnostic("fit", model.group, severity, f"{model.group}: {message}")
 
 
 def cost_of_consistency(

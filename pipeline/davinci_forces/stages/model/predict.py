@@ -195,6 +195,7 @@ def inertia_warning(motion: Motion, fit: Fit) -> str:
     """State why the external effort of a joint is not estimated."""
     return (
         f"{motion.log}/{motion.joint}: the inertia of {fit.model}.{fit.estimator} is not positive along this log, so "
-        f"its external effort is not estimated; the remarks of stage fit on {motion.joint} say why: a motion that "
-        "hardly excites it, a wrong sign, other joints that move in the same logs, or terms that the model lacks"
+        f"its external effort is not estimated; the report may name the cause beside all fits of {motion.joint}: a "
+        "motion that hardly excites it, a wrong sign, other joints that move in the same logs, or terms that the model "
+        "lacks"
     )

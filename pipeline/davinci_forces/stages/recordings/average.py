@@ -61,7 +61,7 @@ def run(
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
     agreeing, length, differing = agreeing_stretch(t, positions, columns, periodic, length, rate, max_harmonics)
-    remarks += omissions(moving[0], periodic, agreeing, length, [(names[d.signal], d) for d in differing])
+    yield from omissions(moving[0], periodic, agreeing, length, [(names[d.signal], d) for d in differing])
     std = standard_error(t[agreeing], [x[agreeing] for x in positions], length, max_harmonics)
     period, period_remarks = reconcile_period(Period(length, std), entry)
     remarks += period_remarks
@@ -112,7 +112,7 @@ def common_repetition(signals: Sequence[Signal]) -> Repetition | None:
     parts = sorted(segments(signals[0].segment), key=lambda part: part.start - part.stop)
     for part in parts[:MAX_SEGMENTS]:
         if repeat := repetition([signal.q[part] for signal in signals]):
-            return repeat._replace(best_start=part.start + repeat.best_start)
+            return Repetition(repeat.lag, *(part.start + i for i in repeat[1:]))
     return None
 
 
@@ -127,8 +127,13 @@ def longest_stretch(
         If the stretch has fewer than two periods.
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
-    two_periods = slice(repeat.best_start, min(repeat.best_start + round(2 * repeat.lag), len(t)))
-    span, length = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
+    span, length = slice(0, 0), 0.0
+    middle = max((repeat.start + repeat.stop) // 2 - round(repeat.lag), repeat.start)
+    for start in (repeat.best_start, middle):  # the two periods that differ least may hold the slow part of a run-in
+        two_periods = slice(start, min(start + round(2 * repeat.lag), len(t)))
+        if two_periods.start < span.start or two_periods.stop > span.stop:
+            other = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
+            span, length = max((span, length), other, key=lambda each: each[0].stop - each[0].start)
     t, positions = t[span], [x[span] for x in positions]
     factors = multiples(length, entry.period, whole_periods(t, length, rate))
     factor = multiple_of_period(t, positions, length, rate, factors)
@@ -150,14 +155,17 @@ def multiples(length: float, stated: float | None, periods: int) -> list[int]:
 
 def omissions(
     first: Signal, periodic: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
-) -> list[str]:
-    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out."""
-    t = first.t
+) -> Iterator[Diagnostic]:
+    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out.
+
+    Less than two periods at either end, as of a rest, a run-in or a stop, are expected, so they are a note.
+    """
+    t, gaps = first.t, gaps_at(first, periodic)
     sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (periodic.start > 0)
     sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
     faults = []
     if sides:
-        what = f"as in a stop, a ramp or another motion{gaps_at(first, periodic)}"
+        what = f"as in a stop, a ramp or another motion{gaps}"
         faults.append(f"{' and '.join(sides)} do not repeat, {what}")
     for name, d in differing:
         inside = d.has_periods_on_both_sides
@@ -173,7 +181,11 @@ def omissions(
     evaluated = f"{'only ' if keys else ''}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
     advice = f"; to confirm this, write {' and '.join(keys)} in study.toml" if keys else ""
     repeats = f"{first.log}: joints repeat every {length:.4f} s"
-    return [f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"] if faults else []
+    short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) < 2.0 * length
+    expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
+    if faults:
+        text = f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"
+        yield diagnostic("average", first.log, "note" if expected else "warning", text)
 
 
 def gaps_at(signal: Signal, periodic: slice) -> str:

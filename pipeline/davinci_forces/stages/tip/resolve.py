@@ -76,8 +76,12 @@ def apply(
     by_joint = {track.joint: track for track in tracks}
     if len(robot.joints) > TIP_JOINTS:  # the chain would assume that the joints beyond stand still
         if entry.role in ("contact", "tissue"):
-            why = f"{robot.name} has {len(robot.joints)} joints, and it is computed only for arms of {TIP_JOINTS}"
-            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {why}")
+            why = f"{robot.name} has {len(robot.joints)} joints"
+            follows = (
+                f"the efforts of more than {TIP_JOINTS} also hold a moment; use the external efforts of the joints"
+            )
+            message = f"{entry.name}: no force at the tip: {why}, and {follows}"
+            yield diagnostic("resolve", entry.name, "note", message)
         return
     names = [joint.name for joint in robot.joints]
     missing = list(missing_joints(names, by_joint))

@@ -6,11 +6,12 @@ import numpy as np
 
 from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Fit, Identifiability, Prediction, Residual
+from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
+    Bullets,
     Cell,
     Equation,
     Figure,
@@ -219,8 +220,11 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     )
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
+    said = context.catalogue.select(Diagnostic, stage="fit", subject=group)
+    remarks = tuple(literal(text.replace("`", "")) for diagnostic in said for text in diagnostic.text)
     first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
     more = (
+        *([Bullets(remarks)] if remarks else []),
         *estimators(context, first),
         *convergence(context, group),
         *correlations(context, group),

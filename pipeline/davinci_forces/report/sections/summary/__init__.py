@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track
+from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
 from davinci_forces.report.content import (
     Block,
     Bullets,
@@ -257,14 +257,14 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
-    kinds: dict[tuple[str, ...], list[str]] = {}
-    for diagnostic in context.catalogue.records(Diagnostic):
-        for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True):
-            if severity == "warning":  # of a kind are those that begin alike after the log's name
-                kinds.setdefault((diagnostic.stage, *text.partition(": ")[2].split()[:3]), []).append(text)
-    for (stage, *_), texts in kinds.items():
-        more = f" ({count(len(texts) - 1, 'more remark')} of this kind)" if texts[1:] else ""
-        yield FIRST_OF_ALL if stage in SPOILS_ALL else 1.5, literal(texts[0].replace("`", "") + more)
+    warnings = (
+        (diagnostic.stage, text)
+        for diagnostic in context.catalogue.records(Diagnostic)
+        for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True)
+        if severity == "warning"
+    )
+    for stage, text in first_of_each_kind(warnings):
+        yield FIRST_OF_ALL if stage in SPOILS_ALL else 1.5, literal(text.replace("`", ""))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:

@@ -103,12 +103,14 @@ const MARKS = {
   Points: {
     draw(context, mark, frame) {
       const { x, y, y_std: std } = mark.data;
-      context.textAlign = "center";
+      Object.assign(context, { textAlign: "center", strokeStyle: colour("--paper"), lineWidth: 3, lineJoin: "round" });
       for (let i = 0; i < x.length; i++) {
         const [across, up] = [frame.x.to(x[i]), frame.y.to(y[i])];
         context.fillRect(across - 2, up - 2, 4, 4);
         if (std) context.fillRect(across - 0.5, frame.y.to(y[i] + std[i]), 1, frame.y.to(y[i] - std[i]) - frame.y.to(y[i] + std[i]));
-        if (mark.names?.[i]) context.fillText(mark.names[i], across, up + (y[i] < 0 ? 15 : -7));
+        const words = [mark.names?.[i] ?? "", across, up + (y[i] < 0 ? 15 : -7)];
+        context.strokeText(...words); // a halo, which covers the lines behind the words
+        context.fillText(...words);
       }
     },
     x: ({ data }) => [data.x],

@@ -67,8 +67,8 @@ class Panel {
     context.beginPath();
     context.rect(frame.left, frame.top, frame.right - frame.left, frame.bottom - frame.top);
     context.clip();
-    context.lineWidth = 1.2;
     for (const mark of this.marks.filter((one) => !one.hidden && MARKS[one.kind])) {
+      context.lineWidth = 1.2;
       context.strokeStyle = context.fillStyle = colour(`--${mark.colour}`);
       MARKS[mark.kind].draw(context, mark, frame);
     }
