@@ -146,7 +146,11 @@ def velocity_faults(
     hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
     fitting = (hint for hint in hints if joint.kind is Kind.PRISMATIC or "mm" not in hint)
     hint = next(fitting, "check the sign, unit and column of both, and the rate of the clock")
-    what = f"is {ratio:.3g} times the derivative of the logged position" if ratio < np.inf else "moves, the position not"
+    what = (
+        f"is {ratio:.3g} times the derivative of the logged position"
+        if ratio < np.inf
+        else "is not 0 though the position stands still"
+    )
     fault = f"{recording.log}/{recording.joint}: the logged velocity {what}; {hint}"
     if not 1 / MAX_VELOCITY_RATIO < ratio < MAX_VELOCITY_RATIO:
         raise BadLog(f"{fault}; without the channel of the velocity, it is derived from the position")
