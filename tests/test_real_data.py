@@ -209,12 +209,17 @@ def test_effort_of_a_drive_of_unknown_gain_is_in_amperes_and_so_are_its_paramete
     }  # fmt: skip
 
 
-def test_one_remark_says_what_the_stop_costs_and_none_where_the_study_says_it(ur10e):
-    _, skipped, both = (" ".join(said.split()) if isinstance(said, str) else said for said in ur10e)
-    assert skipped.count("warning") == 1
-    assert "the 2.44 s after do not repeat, as in a stop, a ramp or another motion" in skipped
-    assert "write until = 60." in skipped
-    assert "warning: ended" not in both
+def test_one_note_says_what_the_stop_costs_and_none_where_the_study_says_it(ur10e):
+    import davinci_forces
+
+    study, skipped, both = ur10e
+    assert "warning" not in f"{skipped}{both}"
+    remarks = davinci_forces.read(study, "Diagnostic", stage="average")
+    [(severity, text)] = zip(remarks["severity"], remarks["text"], strict=True)
+    assert severity == "note"
+    assert text.startswith("skipped: ")
+    assert "the 2.44 s after do not repeat, as in a stop, a ramp or another motion" in text
+    assert "write until = 60." in text
 
 
 def test_what_a_log_that_ends_in_a_stop_says_of_the_joint_predicts_its_periods(ur10e):
