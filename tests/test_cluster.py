@@ -162,9 +162,9 @@ def wait_until_made(file: Path, run: subprocess.Popen) -> None:
     assert run.poll() is None, run.communicate()
 
 
-@pytest.mark.parametrize("record", ["recording", "motion", "fit", "track"])
+@pytest.mark.parametrize("record", ["recording", "track"])
 def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_made(local, whole, begun, record):
-    local.add_worker(), local.add_worker()
+    local.add_worker()
     run = command("measure", str(begun), "--cluster", local.address)
     wait_until_made(processed(begun) / record, run)
     local.processes[0].kill()
@@ -184,8 +184,7 @@ def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_m
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("record", ["recording", "fit"])
+@pytest.mark.parametrize(("record", "number"), [("recording", signal.SIGTERM), ("fit", signal.SIGINT)])
 def test_a_run_on_a_cluster_that_is_stopped_says_so_and_goes_on_next_time(local, whole, begun, record, number):
     local.add_worker()
     run = command("measure", str(begun), "--cluster", local.address)

@@ -16,7 +16,7 @@ import pytest
 from pyarrow import parquet
 
 from davinci_forces.files import PARTIAL
-from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
+from tests.test_robustness import analysed, finished, flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, edit, processed, reports
 from tests.test_workers import end_within
 
@@ -50,9 +50,8 @@ def test_a_disk_that_takes_no_more_is_said_and_leaves_no_partial_file(raw, large
     assert (processed(folder) / "recording" / "one" / "hand_roll.parquet").exists()
 
 
-def test_a_report_that_failed_once_is_the_same_as_that_of_a_clean_run(raw, monkeypatch):  # noqa: F811
-    folder = small(raw / "lab", ("one",))
-    call("all", folder)
+def test_a_report_that_failed_once_is_the_same_as_that_of_a_clean_run(finished, monkeypatch):  # noqa: F811
+    folder = finished
     clean = contents(reports(folder)), contents(processed(folder))
 
     def fail(*_):
@@ -67,9 +66,8 @@ def test_a_report_that_failed_once_is_the_same_as_that_of_a_clean_run(raw, monke
     assert (contents(reports(folder)), contents(processed(folder))) == clean
 
 
-def test_a_stage_that_failed_once_leaves_nothing_behind(raw, monkeypatch):  # noqa: F811
-    folder = small(raw / "lab", ("one",))
-    call("all", folder)
+def test_a_stage_that_failed_once_leaves_nothing_behind(finished, monkeypatch):  # noqa: F811
+    folder = finished
     clean = contents(reports(folder)), contents(processed(folder))
 
     def fail(*_, **__):
@@ -135,9 +133,8 @@ def read_only(monkeypatch):
     return make
 
 
-def test_where_nothing_can_be_written_what_needs_no_writing_is_done(raw, read_only):  # noqa: F811
-    folder = small(raw / "lab", ("one",))
-    call("all", folder)
+def test_where_nothing_can_be_written_what_needs_no_writing_is_done(finished, read_only):  # noqa: F811
+    folder = finished
     before = contents(processed(folder))
     (processed(folder) / ".lock").unlink()
     read_only(processed(folder))
@@ -162,7 +159,7 @@ from davinci_forces.runner import runs
 from davinci_forces.runner.processes import workers
 workers.SECONDS_ALONE = -1.0
 if __name__ == "__main__":
-    sys.exit(0 if runs.run(Path(sys.argv[1]), ALL, jobs=2) else 1)
+    sys.exit(0 if runs.run(Path(sys.argv[1]), ALL, jobs=int(sys.argv[2])) else 1)
 """
 
 
@@ -179,18 +176,17 @@ def children(pid: int) -> list[int]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is there")
-def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_is_left(raw, tmp_path):  # noqa: F811
-    """Parent or worker, at moments over all stages; the next run goes on."""
+def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_is_left(raw, done, tmp_path):  # noqa: F811
+    """Parent or worker, or who does all by himself, at moments over all stages; the next run goes on."""
     kills, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "12")), np.random.default_rng(0)
-    clean = small(tmp_path / "clean" / "raw" / "lab", ("one",))
-    call("all", clean)
-    wanted = contents(processed(clean)), contents(reports(clean))
     folder = small(raw / "lab", ("one",))
     script = tmp_path / "run.py"
     script.write_text(RUN)
     for attempt in range(kills):
         run = subprocess.Popen(
-            [sys.executable, str(script), str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [sys.executable, str(script), str(folder), "1" if attempt % 3 == 2 else "2"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
         with suppress(subprocess.TimeoutExpired):
             run.wait(rng.uniform(1.0, 12.0))
@@ -205,12 +201,12 @@ def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_i
         run.wait()
         assert end_within(5.0, started)
         for name, content in contents(processed(folder)).items():
-            assert name.endswith((PARTIAL, ".lock")) or content == wanted[0][name], name
+            assert name.endswith((PARTIAL, ".lock")) or content == done[0][name], name
         if attempt % 4 == 3:  # otherwise soon nothing would be left to be killed in
             shutil.rmtree(processed(folder))
     call("all", folder)
     assert not partial_files(raw.parent)
-    assert (contents(processed(folder)), contents(reports(folder))) == wanted
+    assert (contents(processed(folder)), contents(reports(folder))) == done
 
 
 COMMAND = """
@@ -234,12 +230,10 @@ writers.renderer = say_and_render
 STOPPED = "stopped; run again to continue\n"
 
 
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    """A study that has run to its end, and what that made."""
-    folder = small(tmp_path_factory.mktemp("done") / "raw" / "lab", ("one",))
-    call("all", folder)
-    return contents(processed(folder)), contents(reports(folder))
+@pytest.fixture
+def done(analysed):  # noqa: F811
+    """What a run to the end of the study makes."""
+    return contents(processed(analysed)), contents(reports(analysed))
 
 
 @pytest.fixture(scope="module")

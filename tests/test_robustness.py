@@ -31,6 +31,7 @@ from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration
 from davinci_forces.stages.recordings import resample
 from tests import arm
+from tests.conftest import once
 from tests.test_runs import call, processed, reports
 
 
@@ -55,9 +56,9 @@ def small(folder, logs=("one", "two")):
 
 @pytest.fixture(scope="module")
 def analysed(tmp_path_factory):
-    folder = small(tmp_path_factory.mktemp("lab") / "raw" / "lab", ("one",))
-    call("all", folder)
-    return folder
+    """A study of one log that every stage has run on; it is made once a run of the tests, and not to be changed."""
+    made = once(tmp_path_factory, "small", lambda home: call("all", small(home / "raw" / "lab", ("one",))))
+    return made / "raw" / "lab"
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -48,13 +47,6 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.fixture
 def study(tmp_path) -> Path:
     return write_study(tmp_path / "raw" / "arm")
-
-
-@pytest.fixture(scope="module")
-def analysed(tmp_path_factory) -> Path:
-    folder = write_study(tmp_path_factory.mktemp("lab") / "raw" / "arm")
-    call("all", folder)
-    return folder
 
 
 @pytest.fixture
@@ -317,23 +309,6 @@ def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
     (finished / "study.toml").write_text("[[log]]".join([first, *(log for log in logs if '"check"' not in log)]))
     stages(finished)
     assert not [name for name in contents(processed(finished)) if "check" in name]
-
-
-@pytest.mark.slow
-def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
-    """Killed again and again, at moments that move, until it is through; every file there is whole throughout."""
-    wanted = contents(processed(analysed))
-    command = [sys.executable, "-c", "from davinci_forces.cli import main; main()", "all", str(study)]
-    for attempt in range(12):
-        running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(0.8 + 0.35 * attempt)
-        running.kill()
-        running.wait()
-        for name, content in contents(processed(study)).items():
-            assert name.endswith((".partial", ".lock")) or content == wanted[name], name
-    call("all", study)
-    assert contents(processed(study)) == wanted
-    assert contents(reports(study)) == contents(reports(analysed))
 
 
 def ran(study: Path) -> set[str]:

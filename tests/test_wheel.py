@@ -106,10 +106,10 @@ def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installe
     python = next(installed.glob("python*"))
     place = run(python, "-c", "import davinci_forces; print(davinci_forces.__file__)", cwd=tmp_path).strip()
     assert Path(place).is_relative_to(installed.parent)
-    run(program, "simulate", "davinci-joints", "raw/joints", cwd=tmp_path)
+    run(program, "simulate", "davinci-filter", "raw/filter", cwd=tmp_path)
     run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)
-    assert {file.name for file in (tmp_path / "reports" / "joints").iterdir()} == {
+    assert {file.name for file in (tmp_path / "reports" / "filter").iterdir()} == {
         "report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt", "summary.json",
         "manifest.txt", "references.bib",
     }  # fmt: skip
-    assert "are unchanged" in run(program, "verify", "raw/joints", cwd=tmp_path)
+    assert "are unchanged" in run(program, "verify", "raw/filter", cwd=tmp_path)

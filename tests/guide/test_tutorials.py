@@ -2,26 +2,20 @@
 
 import os
 import re
+import shlex
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests import forked
 from tests.conftest import ROOT
 from tests.guide.make_logs import LOGS
 
 GUIDE = ROOT / "pipeline" / "davinci_forces" / "guide"
 PAGES = {page.stem: page for page in sorted((GUIDE / "tutorials").glob("*.md"))}
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
-BIN = str(Path(sys.executable).parent)
-ENVIRONMENT = {
-    **os.environ,
-    "PATH": os.pathsep.join([BIN, os.environ["PATH"]]),
-    "PYTHONPATH": str(ROOT / "pipeline"),
-    "COLUMNS": "200",
-    "TERM": "dumb",
-}
+ENVIRONMENT = {**os.environ, "COLUMNS": "200", "TERM": "dumb"}
 
 
 def pattern(line: str) -> str:
@@ -30,16 +24,21 @@ def pattern(line: str) -> str:
     return r"^\s*" + r"\s+".join(words) + r"\s*$"
 
 
+def command(line: str, folder: Path) -> tuple[int | None, str]:
+    """The exit code and the output of a command."""
+    if line.startswith("davinci-forces "):
+        return forked.run(shlex.split(line), folder, ENVIRONMENT)
+    done = subprocess.run(line, shell=True, cwd=folder, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True)
+    return done.returncode, done.stdout
+
+
 def console(text: str, folder: Path) -> None:
     """Run the commands of a block; every line below one is in its output."""
     output = None
     for line in filter(str.strip, text.splitlines()):
         if line.startswith("$ "):
-            done = subprocess.run(
-                line[2:], shell=True, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False
-            )
-            output = done.stdout + done.stderr
-            assert done.returncode == 0, f"{line}\n{output}"
+            code, output = command(line[2:], folder)
+            assert code == 0, f"{line}\n{output}"
         elif line.strip() != "...":
             assert output is not None, f"{line!r} comes before any command"
             assert re.search(pattern(line), output, re.M), f"{line!r} is not in\n{output}"
@@ -55,10 +54,8 @@ def follow(page: Path, folder: Path) -> None:
             (folder / file[1]).write_text(text)
         else:
             assert kind == "python", kind
-            run = subprocess.run(
-                [sys.executable, "-c", text], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False
-            )
-            assert run.returncode == 0, f"{text}\n{run.stderr}"
+            code, said = forked.run(["python", "-c", text], folder, ENVIRONMENT)
+            assert code == 0, f"{text}\n{said}"
 
 
 @pytest.mark.medium

@@ -127,7 +127,7 @@ def test_the_regressor_of_many_motions_is_the_columns_of_the_terms():
 @pytest.mark.parametrize("name", TABLE_6_1)
 def test_any_seed_designs_the_best_trajectory_there_is(name, seed):
     asked = problem(name)
-    assert determinant(observation(asked.terms, design(asked, 24, seed).series)) <= BEST[name] + 1e-5
+    assert determinant(observation(asked.terms, design(asked, 8, seed).series)) <= BEST[name] + 1e-5
 
 
 @pytest.mark.parametrize("name", TABLE_6_1)

@@ -1,7 +1,5 @@
 """The thesis's identification with matched friction, beside realistic friction that differs in nothing else."""
 
-import json
-
 import pytest
 
 import davinci_forces
@@ -52,22 +50,22 @@ def test_section_7_3_has_the_noise_of_table_7_1_a_sinusoid_and_triangles():
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lab") / "raw" / "davinci-thesis"
     call("simulate", "davinci-thesis", folder)
-    call("report", folder)
+    call("model", folder)
     return folder
 
 
-@pytest.fixture(scope="module")
-def results(study):
-    file = study.parent.parent / "reports" / "davinci-thesis" / "results.json"
-    return {r["key"]: r["value"] for r in json.loads(file.read_text())}
+def value(study, kind, name, joint, **place) -> float:
+    """A number of the record of a joint."""
+    return davinci_forces.read(study, kind, joint=joint.name, **place)[name].iloc[0]
 
 
 @pytest.mark.medium
-def test_averaged_effort_has_the_printed_error(results):
+def test_averaged_effort_has_the_printed_error(study):
     for joint in ROBOT.joints:
-        noise = results[f"noise.matched-{joint.name.split('_')[1]}-excitation.{joint.name}.sigma_tau"]
+        noise = value(study, "Average", "sigma_tau", joint, log=f"matched-{joint.name.split('_')[1]}-excitation")
         assert noise**2 / PERIODS == pytest.approx(printed_mse(joint), rel=0.1)
-        assert results[f"fit.{joint.name}.independent.lse.mse"] == pytest.approx(
+        fits = davinci_forces.read(study, "Fit", group=joint.name, model="independent", estimator="lse")
+        assert fits["mse"].iloc[0] == pytest.approx(
             printed_mse(joint),
             rel=4 * (2 / 500) ** 0.5,  # of the variance of 500 samples
         )
@@ -81,10 +79,9 @@ def test_friction_over_velocity_is_drawn_for_both_frictions(study):
 
 
 @pytest.mark.medium
-def test_realistic_friction_adds_to_the_model_error(study, results):
+def test_realistic_friction_adds_to_the_model_error(study):
+    own = {"model": "independent", "estimator": "lse"}
     for joint in ROBOT.joints:
-        exact, realistic = (
-            results[f"predict.{family}-{joint.name.split('_')[1]}-validation.{joint.name}.independent.lse.model_error"]
-            for family in ("matched", "realistic")
-        )
+        logs = [f"{family}-{joint.name.split('_')[1]}-validation" for family in ("matched", "realistic")]
+        exact, realistic = (value(study, "Prediction", "model_error", joint, log=log, **own) for log in logs)
         assert realistic > 1.5 * exact

@@ -82,12 +82,17 @@ class Observed(NamedTuple):
         }
         return self._replace(processing=tuple(processing), motions=tuple(motions[p] for p in processing))
 
-    def rows(self, model: Model, cutoff: float | None = None) -> tuple[Array, Array, Integers]:
+    def rows(self, model: Model) -> tuple[Array, Array, Integers]:
         """Return low-passed Phi (K, m, p) and tau (K, m) of a model of these joints, and their samples (K,).
 
-        Both pass the low-pass of their effort's processing, or one at `cutoff` [Hz].  An effort is NaN while its joint
-        stands still.  Samples at which none of the model's joints moves are omitted.
+        Both pass the low-pass of their effort's processing.  An effort is NaN while its joint stands still.  Samples at
+        which none of the model's joints moves are omitted.
         """
+        [(Phi, tau)], samples = self.rows_at(model, [None])
+        return Phi, tau, samples
+
+    def rows_at(self, model: Model, cutoffs: Sequence[float | None]) -> tuple[list[tuple[Array, Array]], Integers]:
+        """Return Phi and tau of `rows` at each of some cutoffs [Hz], None being the effort's own, and their samples."""
         columns = [self.joints.index(effort) for effort in model.efforts]
         step = max(1, int(self.records[0].rate / (SAMPLES_PER_CUTOFF * self.lowpass)))
         wanted = (np.arange(len(self.block)) % step == 0) & ~self.still[:, columns].all(axis=1)
@@ -95,34 +100,42 @@ class Observed(NamedTuple):
         for processing in dict.fromkeys(self.processing[i] for i in columns):
             efforts = [m for m, i in enumerate(columns) if self.processing[i] == processing]
             motion = self.motions[columns[efforts[0]]]
-            parts[tuple(efforts)] = self._smooth_rows(model, motion, efforts, cutoff or processing.cutoff, wanted)
+            passed = [cutoff or processing.cutoff for cutoff in cutoffs]
+            parts[tuple(efforts)] = self._smooth_rows(model, motion, efforts, passed, wanted)
         samples = reduce(np.intersect1d, (taken for _, taken in parts.values()))
-        Phi = np.zeros((len(samples), len(columns), len(model.parameters)))
-        for efforts_of_part, (rows, taken) in parts.items():
-            Phi[:, list(efforts_of_part)] = rows[np.searchsorted(taken, samples)]
-        tau = np.empty(Phi.shape[:2])
-        for m, i in enumerate(columns):
-            record, passed = self.records[i], cutoff or self.processing[i].cutoff
-            smooth = lowpass_segments(record.tau, record.segment, record.rate, passed)
-            tau[:, m] = np.where(is_still(record), np.nan, smooth)[samples]
-        return Phi, tau, samples
+        results = []
+        for number, cutoff in enumerate(cutoffs):
+            Phi = np.zeros((len(samples), len(columns), len(model.parameters)))
+            for efforts_of_part, (rows, taken) in parts.items():
+                Phi[:, list(efforts_of_part)] = rows[number][np.searchsorted(taken, samples)]
+            tau = np.empty(Phi.shape[:2])
+            for m, i in enumerate(columns):
+                record = self.records[i]
+                smooth = lowpass_segments(record.tau, record.segment, record.rate, cutoff or self.processing[i].cutoff)
+                tau[:, m] = np.where(is_still(record), np.nan, smooth)[samples]
+            results.append((Phi, tau))
+        return results, samples
 
     def _smooth_rows(
-        self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoff: float, wanted: Booleans
-    ) -> tuple[Array, Integers]:
-        """Low-passed Phi (K, e, p) of some efforts at the wanted samples (N,) where it is known, and these samples."""
-        rate, rows, indices = self.records[0].rate, [], []
-        for piece in pieces(model, motion, reach(rate, cutoff)):
+        self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoffs: Sequence[float], wanted: Booleans
+    ) -> tuple[list[Array], Integers]:
+        """Phi (K, e, p) of some efforts, low-passed at each cutoff, at the wanted samples (N,) where it is known, and
+        these samples.
+        """
+        rate, indices = self.records[0].rate, []
+        rows: list[list[Array]] = [[] for _ in cutoffs]
+        for piece in pieces(model, motion, max(reach(rate, cutoff) for cutoff in cutoffs)):
             Phi, is_known = model.regressor(piece.motion)
             Phi = Phi[:, efforts]
             taken = np.flatnonzero(is_known[piece.inside] & wanted[piece.place])
-            smooth = np.zeros((len(taken), *Phi.shape[1:]))
             present = Phi.any(axis=0)  # most columns belong to one effort only
-            passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, cutoff)
-            smooth[:, present] = passed[piece.inside][taken]
-            rows.append(smooth)
+            for at_cutoff, cutoff in zip(rows, cutoffs, strict=True):
+                smooth = np.zeros((len(taken), *Phi.shape[1:]))
+                passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, cutoff)
+                smooth[:, present] = passed[piece.inside][taken]
+                at_cutoff.append(smooth)
             indices.append(taken + piece.place.start)
-        return np.concatenate(rows), np.concatenate(indices)
+        return [np.concatenate(at_cutoff) for at_cutoff in rows], np.concatenate(indices)
 
 
 def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
@@ -196,14 +209,11 @@ def equations(model: Model, logs: Sequence[Observed], count: int) -> CellEquatio
     """Return the normal equations of all `count` logs, in cells of the path and of the periods."""
     samples, by_block, by_period, scored = np.zeros(len(model.efforts), np.int64), [], [], []
     for log in logs:
-        Phi, tau, rows = log.rows(model)
-        samples += (~np.isnan(tau)).sum(axis=0)
-        by_block.append(sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS))
-        by_period.append(sum_equations(Phi, tau, log.period[rows], MAX_GROUPS))
-        if any(processing.cutoff != log.lowpass for processing in log.processing):
-            Phi, tau, rows = log.rows(model, log.lowpass)
-            scored.append(sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS))
-        else:
-            scored.append(by_block[-1])
+        differs = any(processing.cutoff != log.lowpass for processing in log.processing)
+        passed, rows = log.rows_at(model, [None, log.lowpass] if differs else [None])
+        samples += (~np.isnan(passed[0][1])).sum(axis=0)
+        by_block.append(sum_equations(*passed[0], log.block[rows], PATH_BLOCKS))
+        by_period.append(sum_equations(*passed[0], log.period[rows], MAX_GROUPS))
+        scored.append(sum_equations(*passed[1], log.block[rows], PATH_BLOCKS) if differs else by_block[-1])
     numbers = [log.number for log in logs]
     return CellEquations(samples, *(side_by_side(part, numbers, count) for part in (by_block, by_period, scored)))

@@ -247,12 +247,12 @@ def _lagrangian(
 
 def _slopes(function: Callable[..., Array], motion: Sequence[Array]) -> list[Array]:
     """Derivatives (K, n) of a function (K,) of each sample of a motion by each part (K, n) of it."""
-    slopes = [np.empty_like(part) for part in motion]
-    for i, slope in enumerate(slopes):
-        for j in range(slope.shape[1]):
-            both = [np.stack([part, part]) for part in motion]
-            both[i][:, :, j] += np.array([[STEP], [-STEP]])
-            slope[:, j] = np.subtract(*function(*both)) / (2 * STEP)
+    n, slopes = motion[0].shape[1], []
+    steps = STEP * np.concatenate([np.eye(n), -np.eye(n)])[:, None]
+    for i in range(len(motion)):
+        moved = [part + (steps if k == i else 0 * steps) for k, part in enumerate(motion)]  # (2 n, K, n)
+        ahead, behind = np.split(function(*moved), 2)
+        slopes.append((ahead - behind).T / (2 * STEP))
     return slopes
 
 

@@ -20,12 +20,12 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
-    from scipy.signal import sosfilt, sosfilt_zi
+    from scipy.signal import sosfilt
 
-    sos, pad = _sections(rate, cutoff), min(3 * round(rate / cutoff) + 3, len(x) - 1)
+    (sos, steady), pad = _sections(rate, cutoff), min(3 * round(rate / cutoff) + 3, len(x) - 1)
     y = np.concatenate([2 * x[:1] - x[pad:0:-1], x, 2 * x[-1:] - x[-2 : -pad - 2 : -1]])
     for way in (y, y[::-1]):  # as sosfiltfilt, which holds four copies of a long signal at once
-        z = sosfilt_zi(sos).reshape(-1, 2, *(1,) * (x.ndim - 1)) * way[0]
+        z = steady.reshape(-1, 2, *(1,) * (x.ndim - 1)) * way[0]
         for rows in row_blocks(len(y)):
             way[rows], z = sosfilt(sos, way[rows], axis=0, zi=z)
     return np.asarray(y[pad:-pad])
@@ -38,7 +38,7 @@ def reach(rate: float, cutoff: float) -> int:
         return 0
     from scipy.signal import sos2zpk
 
-    largest_pole = float(np.abs(sos2zpk(_sections(rate, cutoff))[1]).max())
+    largest_pole = float(np.abs(sos2zpk(_sections(rate, cutoff)[0])[1]).max())
     return int(np.ceil(np.log(np.finfo(float).eps) / np.log(largest_pole)))
 
 
@@ -49,15 +49,17 @@ def share_passed(rate: float, cutoff: float) -> float:
         return 1.0
     from scipy.signal import sosfreqz
 
-    _, H = sosfreqz(_sections(rate, cutoff), 4096)
+    _, H = sosfreqz(_sections(rate, cutoff)[0], 4096)
     return float(np.mean(np.abs(H) ** 4))  # two passes multiply the amplitude by |H| each
 
 
 @cache
-def _sections(rate: float, cutoff: float) -> Array:
-    from scipy.signal import butter
+def _sections(rate: float, cutoff: float) -> tuple[Array, Array]:
+    """Second-order sections (2, 6) of the filter, and their states (2, 2) after a long input of 1."""
+    from scipy.signal import butter, sosfilt_zi
 
-    return np.asarray(butter(FILTER_ORDER, cutoff, fs=rate, output="sos"))
+    sos = np.asarray(butter(FILTER_ORDER, cutoff, fs=rate, output="sos"))
+    return sos, np.asarray(sosfilt_zi(sos))
 
 
 def measured_motion(
@@ -80,7 +82,10 @@ def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) 
         return smooth, np.zeros_like(q), np.zeros_like(q)
     velocity = np.gradient(smooth, 1.0 / rate) if dq is None else lowpass(dq, rate, cutoff)
     acceleration = np.gradient(velocity, 1.0 / rate)
-    return _delay(smooth, lag * rate), _delay(velocity, lag * rate), _delay(acceleration, lag * rate)
+    if lag:  # one spline for all three
+        columns = _delay(np.stack([smooth, velocity, acceleration], axis=1), lag * rate)
+        smooth, velocity, acceleration = np.ascontiguousarray(columns.T)
+    return smooth, velocity, acceleration
 
 
 def delay_segments(x: Array, segment: Integers, samples: float) -> Array:
@@ -89,15 +94,18 @@ def delay_segments(x: Array, segment: Integers, samples: float) -> Array:
 
 
 def _delay(x: Array, samples: float) -> Array:
-    """Delay a signal (N,) by `samples`, with a cubic spline; beyond its ends x(e + s) = 2 x(e) - x(e - s)."""
-    if samples == 0.0:
-        return x
+    """Delay a signal (N,), or columns (N, ...), by `samples`, with a cubic spline.
+
+    Beyond its ends it goes on as x(e + s) = 2 x(e) - x(e - s).
+    """
     from scipy.interpolate import make_interp_spline
 
     k = np.arange(len(x), dtype=float)
-    spline, last = make_interp_spline(k, x, k=min(3, len(x) - 1)), k[-1]
-    inside = np.clip(k - samples, 0.0, last)
-    return np.asarray(2.0 * spline(inside) - spline(np.clip(2.0 * inside - (k - samples), 0.0, last)))
+    spline, at, last = make_interp_spline(k, x, k=min(3, len(x) - 1)), k - samples, k[-1]
+    inside = np.clip(at, 0.0, last)
+    delayed, beyond = np.asarray(spline(inside)), np.flatnonzero(inside != at)
+    delayed[beyond] = 2.0 * delayed[beyond] - spline(np.clip(2.0 * inside[beyond] - at[beyond], 0.0, last))
+    return delayed
 
 
 def segments(segment: Integers) -> Iterator[slice]:
