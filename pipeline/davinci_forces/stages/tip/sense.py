@@ -49,7 +49,9 @@ def run(
     yield from shown
     if opposite := ", ".join(f"force_{force.axis}" for force in shown if force.axis in AXES and is_opposite(force)):
         text = f"{entry.name}: the sensor shows the opposite of the estimate: if it measures the force on the robot"
-        yield diagnostic("sense", f"{entry.name}.sign", "warning", f"{text}, write sign = -1 with {opposite}")
+        yield diagnostic(
+            "sense", f"{entry.name}.sign", "warning", f"{text}, write sign = -1 with {opposite} in study.toml"
+        )
 
 
 def is_opposite(force: SensorForce) -> bool:
