@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import Event, events, summarise, typical_alarm_level
+from davinci_forces.maths.contact.detection import TIP_REACH, Event, events, summarise, typical_alarm_level
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
@@ -32,7 +32,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
-    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - track.smooth_rise)
+    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - TIP_REACH * track.smooth_rise)
     level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
