@@ -313,7 +313,8 @@ class _Writer:
         yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
         if self.role.role == "weight":
             mass = f"{self.role.mass:g}" if self.role.mass else '"<kg, if known>"'
-            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # [m] from the remote centre'
+            position = "position = [0.0, 0.0, 0.0] }  # [m] from the remote centre"
+            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", {position}'
 
     def _rate(self) -> Iterator[str]:
         timing, tissue = self.draft.guess.timing, bool(self.draft.touching)
