@@ -132,6 +132,18 @@ def test_a_sensor_of_one_axis_is_compared_with_the_size_of_the_force():
     assert one.sensor_coverage == 1.0
 
 
+def test_a_sensor_of_the_opposite_sign_is_named_axis_by_axis():
+    """One of the force on the robot, one with its z axis down, and one that is right."""
+    estimate = tip(efforts(ROBOT, PUSH) + noise(1))
+    for signs, said in (((-1, -1, -1), "force_x, force_y, force_z"), ((1, 1, -1), "force_z"), ((1, 1, 1), "")):
+        found = [
+            text for one in sensed(touch(PUSH * signs), [estimate]) if isinstance(one, Diagnostic) for text in one.text
+        ]
+        assert [text.partition("write sign = -1 with ")[2].removesuffix(" in study.toml") for text in found] == [
+            said
+        ] * bool(said)
+
+
 def test_without_a_force_at_the_tip_the_joint_that_slides_is_compared_with_its_sign():
     tau = np.zeros((len(T), 3))
     tau[:, 2] = -PUSH[:, 2]

@@ -350,6 +350,14 @@ def test_messages_are_those_of_the_stages_and_no_stage_with_remarks_is_left_out(
     assert len({row[1] for row in table}) == len(table)
 
 
+def test_every_row_of_a_table_is_below_the_head_of_one():
+    for topic, text in PAGES.items():
+        blocks = [block.splitlines() for block in re.sub(r"```.*?```", "", text, flags=re.DOTALL).split("\n\n")]
+        for lines in blocks:
+            rows = [i for i, line in enumerate(lines) if line.startswith("|")]
+            assert not rows or lines[rows[0] + 1].startswith("|--"), (topic, lines[rows[0]])
+
+
 def test_terms_are_in_order_and_each_once():
     terms = [row[0] for row in rows("term", "means")]
     assert terms == sorted(set(terms))

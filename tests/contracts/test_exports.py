@@ -296,6 +296,8 @@ def test_bodies_are_completed_by_those_nearest_to_the_robot_s_guesses():
     assert_allclose(arm.inertial.ravel(), guess, rtol=0, atol=1e-7)
     light = urdf.completed_arm(replace(DAVINCI, bodies=None), arm.fit)
     assert light.inertial[:, 0].sum() < 0.9 * guess[::10].sum()
+    J = pseudo_inertias(light.inertial[light.inertial[:, 0] > 0.0])  # simulators refuse a body without any inertia
+    assert (np.linalg.eigvalsh(J / J[:, 3:, 3:])[:, 0] > 1e-13).all()
 
 
 @pytest.fixture

@@ -413,7 +413,10 @@ def test_a_force_sensor_beside_joints_is_proposed_and_what_a_controller_estimate
     call("new", bench(tmp_path, header, np.sin, np.cos, np.tanh))
     [entry] = reading.read(tmp_path).logs
     assert [s.channel for s in entry.channels if s.quantity == "force"] == ["force_sensor"]
-    assert "CHECK THIS; a force sensor, to compare the estimate with" in (tmp_path / "study.toml").read_text()
+    assert (
+        "CHECK THIS; compared with the estimate; sign = -1 for a sensor of the force on the robot"
+        in (tmp_path / "study.toml").read_text()
+    )
 
 
 def test_where_no_log_can_be_used_the_last_line_says_what_to_do(tmp_path):

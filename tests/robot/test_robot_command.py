@@ -14,7 +14,10 @@ from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
-KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
+KEYS = [
+    "frames", "tip", "remote_centre", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition",
+    "warnings", "joints",
+]  # fmt: skip
 app = typer.Typer()
 app.command()(errors_as_messages()(robot.run))
 
@@ -39,6 +42,7 @@ def test_the_json_holds_what_the_library_computes(n):
         np.testing.assert_array_equal(found["frames"][name]["origin"], T[:3, 3])
         np.testing.assert_array_equal(found["frames"][name]["rotation"], T[:3, :3])
     assert found["tip"] == found["frames"]["9L"]["origin"]
+    assert found["remote_centre"] == pytest.approx([0.0, 0.48, 0.161])
     J_v, J_w = kinematics.jacobian(CHAIN, q)
     np.testing.assert_array_equal(found["jacobian_v"], J_v)
     np.testing.assert_array_equal(found["jacobian_w"], J_w)

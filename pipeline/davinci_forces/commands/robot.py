@@ -121,6 +121,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
             for name, t in zip(chain.names, T, strict=True)
         },
         "tip": kinematics.tip(chain, pose).tolist(),
+        "remote_centre": kinematics.remote_centre(chain).tolist(),
         "jacobian_v": J_v.tolist(),
         "jacobian_w": J_w.tolist(),
         **_dynamics(robot, pose, rates),
@@ -197,6 +198,7 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     lines += ["", f"{'frame':>{width}}   origin [m]"]
     lines += [f"{name:>{width}}   {_numbers(frame['origin'])}" for name, frame in document["frames"].items()]
     lines += ["", f"tip [m]   {_numbers(document['tip'])}"]
+    lines += [f"remote centre of the first two joints at q = 0 [m]   {_numbers(document['remote_centre'])}"]
     titles = {"jacobian_v": "J_v of the tip", "jacobian_w": "J_omega", "mass": "M"}
     for key, title in titles.items():
         if document[key] is not None:

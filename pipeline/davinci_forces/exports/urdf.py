@@ -144,6 +144,7 @@ def _tables(export: Export, arm: IdentifiedArm, free: FreeLogs, lost: Sequence[t
     sums += [""] * (len(fit.theta) - len(sums))
     numbers = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, sums, strict=True)
     yield "\n# Identified parameters\n\nOnly these combinations follow from the logs."
+    yield "Axes of a link have z along its joint."
     yield from _table("parameter", "value", "standard error", "unit", "combination")
     yield from (_row(name, f"{value:.6g}", f"{std:.2g}", unit, text) for name, value, std, unit, text in numbers)
     yield "\n# What the URDF does not hold\n\nShare: of the root mean square of the measured effort in free motion."

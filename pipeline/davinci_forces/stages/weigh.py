@@ -288,7 +288,7 @@ def estimate_mass(
         agreement=test.probability, agreement_mirrored=mirrored_test.probability, birge_ratio=test.ratio,
         differing=differing, mass_mirrored=mass_mirrored,
         mass_mirrored_std=widen(mirrored_std, mass_mirrored, alone[1], mirrored_test),
-        side=side_of(better(*sides)), mass_scale=mass / stated, mass_scale_std=std / stated,
+        side=side_of(better(*sides), mass_mirrored), mass_scale=mass / stated, mass_scale_std=std / stated,
         tare_mass=tare_mass.mass if tare_mass else float("nan"),
         tare_mass_std=total_std(tare_mass, free) if tare_mass else float("nan"),
         loaded=np.array(joints, object), unit=np.array([units[joint] for joint in joints], object),
@@ -320,15 +320,19 @@ def contradiction(log: str, joints: Sequence[str], alone: Sequence[MassEstimate]
     return (
         f"{log}: the joints tell different masses ({masses}; probability {test.probability:.1g} if they agree), "
         f"{joints[test.differing]} most of all; the interval is widened to contain all: check this joint's "
-        "model at this speed, its gear and motor, and the position of the mass"
+        "model at this speed, its gear and motor, and the position of the mass, which is from the remote centre that "
+        "`davinci-forces robot` prints"
     )
 
 
-def side_of(advantage: float) -> str:
-    """Side of the link on which the mass is, by how much better the stated side explains the effort."""
+def side_of(advantage: float, mirrored: float) -> str:
+    """Side of the link on which the mass is, by how much better the stated side explains the effort.
+
+    A `mirrored` mass that is negative shows that it is not on the other side.
+    """
     if advantage > MIN_SIDE_DIFFERENCE:
         return "as stated"
-    return "the other one" if advantage < -MIN_SIDE_DIFFERENCE else "not told"
+    return "the other one" if advantage < -MIN_SIDE_DIFFERENCE and mirrored > 0.0 else "not told"
 
 
 def total_std(mass: MassEstimate, free: FreeMotionErrors) -> float:

@@ -313,7 +313,8 @@ class _Writer:
         yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
         if self.role.role == "weight":
             mass = f"{self.role.mass:g}" if self.role.mass else '"<kg, if known>"'
-            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # its place [m]'
+            position = "position = [0.0, 0.0, 0.0] }  # [m] from the remote centre"
+            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", {position}'
 
     def _rate(self) -> Iterator[str]:
         timing, tissue = self.draft.guess.timing, bool(self.draft.touching)
@@ -356,7 +357,7 @@ class _Writer:
                 continue
             if channel.name in self.draft.sensor:
                 line = _touch_line(channel, self.draft.sensor[channel.name], in_millimetres=False)
-                sensor = "a force sensor, to compare the estimate with"
+                sensor = "compared with the estimate; sign = -1 for a sensor of the force on the robot"
                 yield f"{line}; {sensor}" if "CHECK" in line else f"{line}  # CHECK: {sensor}"
             elif channel.name in touching:
                 yield _touch_line(channel, touching[channel.name], channel.name in big)

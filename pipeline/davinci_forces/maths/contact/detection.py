@@ -159,6 +159,7 @@ class Summary(NamedTuple):
     mean_std: float
     impulse: float  # mean times duration
     impulse_std: float
+    noise_std: float  # of the peak, without what the smoother rounds off
 
 
 def summarise(
@@ -186,8 +187,9 @@ def summarise(
     mean_std = float(np.linalg.norm([mean_size(tau_ext, free, len(inside)), constant, spread_out]))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
-    peak_std = float(np.linalg.norm([std[k], rounded_off, largest_size(tau_ext, free, len(inside))]))
-    return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration)
+    noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))
+    peak_std = float(np.hypot(noise_std, rounded_off))
+    return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration, noise_std)
 
 
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:

@@ -30,6 +30,7 @@ AT_BOUND = 1e-8  # a value nearer to its bound than this share of the effort is 
 TOLERANCE = 1e-12  # of the solver's gaps and residuals
 MAX_STEP_FRACTION = 0.9  # a longer step towards the edge of a cone lets rounding stop the solver early
 MAX_GAP_SOLVER = 1e-8  # duality gap, as a share of the effort's square
+MIN_THICKNESS = 1e-9  # smallest eigenvalue of J over its largest: simulators refuse a body without any inertia
 LENGTH = 0.1  # [m] size of the links of an arm for surgery, which compares moments of inertia with masses
 
 
@@ -205,6 +206,7 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
         raise NotIdentifiable(f"no links were found that have these parameters: they miss them by {miss:.1e}")
     x = B @ np.where(mechanism.positive & ~links, np.maximum(z, 0.0), z)
     J = pseudo_inertias(x[links].reshape(L, TEN)) / np.outer(scale, scale)
-    values, V = np.linalg.eigh(J)  # the solver's errors may leave values below 0
-    J = (V * np.maximum(values, 0.0)[:, None]) @ V.swapaxes(1, 2) * np.outer(scale, scale)
+    values, V = np.linalg.eigh(J)  # bodies at the edge of what is possible, or by the solver's errors beyond it
+    values = np.maximum(values, MIN_THICKNESS * values[:, -1:])
+    J = (V * values[:, None]) @ V.swapaxes(1, 2) * np.outer(scale, scale)
     return np.concatenate([of_pseudo_inertias(J).ravel(), x[~links]])

@@ -85,12 +85,12 @@ def to_base(chain: Chain, body: int) -> Iterator[int]:
 def remote_centre(chain: Chain) -> Array:
     """The remote centre of motion (3,) [m]: the first two coordinates turn the instrument about this fixed point.
 
-    On the last link that the second coordinate moves, it is the point that neither coordinate moves at q = 0.  The
-    parallelogram keeps this point in place for all q.  Section 2.2
+    On the last link that the second coordinate moves, it is the point that neither coordinate moves at q = 0, or the
+    nearest to both axes.  The parallelogram keeps this point in place for all q.  Section 2.2
     """
-    tip_body = int(chain.body[chain.names.index(chain.tip)])
-    body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
+    tip_body, n = int(chain.body[chain.names.index(chain.tip)]), min(chain.n, 2)
+    body = next((body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1), tip_body)
     # v + w x p = 0 for both
-    v, w = (J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))
+    v, w = (J.T for J in _jacobian(chain, poses_of_bodies(chain, np.zeros(n)), n, body, np.zeros(3)))
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

@@ -100,7 +100,7 @@ ARM = {
     "moved_by": Quantity("number of the coordinate that moves the link, from 1; 0 for none"),
     "mass": Quantity("mass of the link, or of the weight on the arm", "kg"),
     "x": Quantity("position along x: of a robot, x0", "m"),
-    "y": Quantity("position along y: of a robot, y0, the roll axis", "m"),
+    "y": Quantity("position along y: of a robot, y0", "m"),
     "z": Quantity("position along z: of a robot, z0, up", "m"),
     "worst_condition": Quantity("largest condition number of the tip's Jacobian within the limits"),
     "start": Quantity("position at the start", "{position}"),

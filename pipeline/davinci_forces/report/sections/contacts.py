@@ -21,16 +21,16 @@ def section(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(
-            "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is"
-            " found there. The window of a contact is stated in study.toml. Otherwise it is the time in which the "
+            "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is "
+            "found there. The window of a contact is stated in study.toml. Otherwise it is the time in which the "
             "smoothed external effort exceeds the alarm level, which free motion crosses at most once in ten "
-            "minutes, if the interval of the peak does not hold zero. Onset and release are the times at which the "
-            "effort leaves zero and returns to it. Peak (the largest external effort), mean and impulse (effort "
-            "times time) are taken over the whole window. Their standard errors are their spread over windows of the"
-            " same length in free space. The standard error of a peak also includes the smoother's standard "
-            "deviation there, and the height by which smoothing flattens the peak. The standard error of a mean also"
-            " includes the effort that smoothing moves out of the window. Peaks are judged by the detection level, "
-            "which is lower: 99 % of the samples of the joint's worst run in free space "
+            "minutes, if the interval of the peak, without its flattening, does not hold zero. Onset and release are "
+            "the times at which the effort leaves zero and returns to it. Peak (the largest external effort), mean "
+            "and impulse (effort times time) are taken over the whole window. Their standard errors are their spread "
+            "over windows of the same length in free space. The standard error of a peak also includes the "
+            "smoother's standard deviation there, and the height by which smoothing flattens the peak. The standard "
+            "error of a mean also includes the effort that smoothing moves out of the window. Peaks are judged by "
+            "the detection level, which is lower: 99 % of the samples of the joint's worst run in free space "
             f"stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)
@@ -141,4 +141,4 @@ def reason(entry: LogEntry, track: Track | None) -> str:
         )
     if entry.role != "contact":
         return f"a log of role “{entry.role}” is tracked, but its windows are not measured"
-    return "no contact was found above the alarm level; write `contact = [[start, end]]` if there was a contact"
+    return "nothing stands out above the alarm level; write `contact = [[start, end]]` if there was a contact"

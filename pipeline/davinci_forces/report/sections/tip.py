@@ -34,7 +34,6 @@ from davinci_forces.report.sections.parts import section_of, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 F = ("f_x", "f_y", "f_z")
-AXIS_LABELS = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
 PATH_POINTS = 600  # points drawn of the path in space
 CONVERGENCE = 1.0  # [s] time in which the filter converges; the axis of the force does not show its wide band
 SPACING = 0.2  # [s] between the vectors that are drawn in a contact
@@ -125,7 +124,7 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
         "level cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains "
         "zero. Condition: the median condition number of the Jacobian, the ratio between the errors of the force in "
         "its least and its most certain direction if all joints err alike. Near singular: samples with a condition "
-        f"number above {NEAR_SINGULAR:g}, at which the tip is within about a centimetre of the remote centre; these "
+        f"number above {NEAR_SINGULAR:g}, as within about a centimetre of the remote centre of a da Vinci arm; these "
         "samples are left out."
     )
     header = ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular")
@@ -148,7 +147,7 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
         f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
         f"{' Windows of contact are shaded.' if contact is not None else ''}",
         f"Components of the force at the tip over time in {name}, and the condition number of its poses.",
-        (*(component_panel(force, axis, contact) for axis in AXIS_LABELS), condition_panel(force)),
+        (*(component_panel(force, axis, contact) for axis in "xyz"), condition_panel(force)),
         f"tip-time-{force.log}",
         zoomable=True,
         height=32,
@@ -170,7 +169,7 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
         Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
     shown = reach(force, f - NORMAL_95 * std, f + NORMAL_95 * std)
-    return Panel(f"Along {AXIS_LABELS[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
+    return Panel(f"Along {axis}0", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
 
 
 def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import Event, events, summarise, typical_alarm_level
+from davinci_forces.maths.contact.detection import TIP_REACH, Event, events, summarise, typical_alarm_level
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
@@ -32,7 +32,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
-    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - track.smooth_rise)
+    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - TIP_REACH * track.smooth_rise)
     level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
@@ -84,6 +84,7 @@ def contacts(
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts, and any outside them.
 
     A contact is not found if the 95 % interval of its peak holds zero, as where the arm swings after a larger push.
+    What the smoother rounds off does not count in that interval: it makes a peak smaller, never larger.
     """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
@@ -96,16 +97,20 @@ def contacts(
         return
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
-    rows, above = [], []
+    rows, above, short = [], [], []
     for window, event, stated in placed:
         summary = summarise(track.t, steady_effort(track), window, free, track.smooth_rise, friction_std)
-        if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.peak_std:
+        if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.noise_std:
             event = None
         if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
-            rows.append((int(stated), int(event is not None), *times, *duration, *summary))
+            rows.append((int(stated), int(event is not None), *times, *duration, *summary[:-1]))
             above.append(is_above[~is_outside(track.t, [window])].any())
+            if not stated and release - onset < track.smooth_rise:
+                short.append(hidden_peak(track, onset))
+    if short:
+        yield diagnostic("measure", f"{track.log}.{track.joint}.short", "warning", *short)
     if not rows:
         return
     names = (
@@ -119,6 +124,13 @@ def contacts(
 def steady_effort(track: Track) -> tuple[Array, Array]:
     """The smoothed effort (N,) and its deviation (N,) without what is rounded off, which is added to that of a peak."""
     return track.tau_ext_smooth, np.sqrt(track.tau_ext_smooth_std**2 - track.tau_ext_rounding**2)
+
+
+def hidden_peak(track: Track, onset: float) -> str:
+    """State that a contact is too short for its peak to be seen."""
+    text = f"{track.log}/{track.joint}: the contact at {onset:.4g} s is shorter than {track.smooth_rise:.2g} s, "
+    remedy = "state a window of a second around it in study.toml, and read its impulse"
+    return f"{text}which the smoother takes to show a step, so its peak may be several times larger: {remedy}"
 
 
 def unknown_friction(track: Track) -> Array:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.contact.force_sensor import errors, interpolate_sensor, lag
+from davinci_forces.maths.contact.force_sensor import MIN_CORRELATION, errors, interpolate_sensor, lag
 from davinci_forces.maths.signals.windows import is_past_transient
 from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, Track, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
@@ -45,8 +45,19 @@ def run(
             "external effort of a prismatic joint is known for enough samples"
         )
         yield diagnostic("sense", entry.name, "warning", message)
-    for axis, estimate, measured in pairs:
-        yield from sensor_force(entry, axis, estimate, touch.t, measured)
+    shown = [force for axis, f, measured in pairs for force in sensor_force(entry, axis, f, touch.t, measured)]
+    yield from shown
+    if opposite := ", ".join(f"force_{force.axis}" for force in shown if force.axis in AXES and is_opposite(force)):
+        text = f"{entry.name}: the sensor shows the opposite of the estimate: if it measures the force on the robot"
+        yield diagnostic(
+            "sense", f"{entry.name}.sign", "warning", f"{text}, write sign = -1 with {opposite} in study.toml"
+        )
+
+
+def is_opposite(force: SensorForce) -> bool:
+    """Whether the sensor's force is the estimate with the other sign."""
+    f, sensor = np.stack([force.estimated_force, force.measured_force])[:, np.isfinite(force.measured_force)]
+    return bool(np.cov(f, sensor)[0, 1] < -MIN_CORRELATION * f.std() * sensor.std())
 
 
 def comparisons(
