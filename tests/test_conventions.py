@@ -254,7 +254,6 @@ OPENS = {  # a module that opens files otherwise than through `files`, and why i
     "cli.py": "the package's own code",
     "maths/compiled.py": "the package's own code",
     "runner/signature.py": "the package's own code",
-    "runner/fingerprints/code.py": "the package's own code",
     "report/writers/html.py": "the package's own templates",
     "report/writers/typesetting.py": "the package's own templates",
     "simulation/scenario/reading.py": "the package's own scenarios",

@@ -286,6 +286,22 @@ def test_the_filters_noise_is_that_of_the_recording(identified):
     assert (made.r_q, made.r_dq) == (noise.r_q, noise.r_dq)
 
 
+def test_the_slowest_walk_at_a_high_rate_shows_a_push_and_takes_no_trials_of_that_rate():
+    T_s, samples = 1e-5, []
+    noise = NOISE._replace(r_q=NOISE.r_q * 30.0, r_dq=NOISE.r_dq * 30.0, q_dq=NOISE.q_dq / 30.0)
+
+    def track(recording, noise):
+        samples.append(recording.samples)
+        return ekf.track(recording, noise)
+
+    walk = smallest_q_tau(track, 0.4, 0.3, T_s, noise)
+    assert max(samples) < 50_000 < 4.0 / T_s
+    shown, slower = (push_response_at_rest(ekf.track, 0.4, 0.3, T_s, noise._replace(q_tau=x * walk)) for x in (1, 0.98))
+    assert shown.share > 0.9 - 1e-3
+    assert shown.delay < 0.1 + 1e-3
+    assert slower.share < 0.9 or slower.delay > 0.1
+
+
 def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_push(identified):
     [noise], joint = identified[1], arm.joint("hand_roll")
     own = replace(joint, q_tau=0.3)

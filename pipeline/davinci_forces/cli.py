@@ -1,6 +1,7 @@
 """Estimate the contact forces of a da Vinci arm from its motor currents, without a force sensor."""
 
 import atexit
+import gc
 import os
 import re
 import signal
@@ -111,6 +112,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the console's encoding may lack characters of names in logs
             stream.reconfigure(errors="replace")
+    atexit.register(gc.freeze)  # or Python would search all objects for cycles as it ends, a tenth of a short command
     atexit.register(ignore_signals)  # a signal that arrives while Python ends would end it without a message
     for number in STOP_SIGNALS:
         if signal.getsignal(number) != signal.SIG_IGN:  # unless ignored already, as in the background of a script

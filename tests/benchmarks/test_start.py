@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-TYPER = 1.3  # times at most, what our help takes, over that of a program of one command
+TYPER = 1.25  # times at most, what our help takes, over that of a program of one command
 COMPILER = 1.2  # times at most, what a first filter takes, over a first compiled loop of the same length
 TURNS = 7
 

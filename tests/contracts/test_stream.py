@@ -151,7 +151,7 @@ def test_a_window_gives_a_cubic_and_its_derivatives_exactly(place):
         assert_allclose(computed[interior], exact[interior], rtol=1e-7, atol=1e-9)
 
 
-@pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0])
+@pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0, 100_000.0])
 def test_a_window_passes_half_at_the_cutoff(rate):
     half = online.half_width(rate, 17.0)
     gains = [

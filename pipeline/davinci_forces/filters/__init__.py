@@ -6,7 +6,7 @@ from importlib import import_module
 import numpy as np
 
 from davinci_forces.filters.problem import Block, BlockFilter, Filter, NoiseModel, Recording, Tracked, join_blocks
-from davinci_forces.maths.arrays import BLOCK_SAMPLES
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the other filters are compared with this one
@@ -61,6 +61,9 @@ def _concatenated(blocks: Sequence[Block]) -> Block:
     return slice(blocks[0][0].start, blocks[-1][0].stop), Tracked(*(np.concatenate(column) for column in columns))
 
 
-def diverges(tracked: Tracked) -> bool:
-    """Whether the innovations are so much larger than the filter assumes that its result is not usable."""
-    return not np.isfinite(tracked.tau_ext).all() or float(np.mean(tracked.nis)) > 2.0 * MAX_NIS_RATIO
+def diverges(tau_ext: Array, nis: float) -> bool:
+    """Whether the innovations are so much larger than the filter assumes that its result is not usable.
+
+    `tau_ext` (N,) is the filter's external effort, and `nis` the mean of its normalised innovations squared.
+    """
+    return not np.isfinite(tau_ext).all() or nis > 2.0 * MAX_NIS_RATIO

@@ -8,6 +8,7 @@ Exports copy this file and `sample`; they need numpy alone, and Python 3.10 or l
 """
 
 import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -202,13 +203,12 @@ def half_width(rate: float, cutoff: float) -> int:
 
     As in the analysis, a cutoff at or above 0.4 of the rate removes nothing.
     """
-    half = 2
-    while cutoff < 0.4 * rate:
+
+    def removes(half: int) -> bool:  # of a width, and of any larger one
         k = np.arange(-half, half + 1)
-        if weights(half, 0.0, rate)[0] @ np.cos(2.0 * np.pi * cutoff / rate * k) <= 0.5:
-            break
-        half += 1
-    return half
+        return bool(weights(half, 0.0, rate)[0] @ np.cos(2.0 * np.pi * cutoff / rate * k) <= 0.5)
+
+    return 2 + (bisect_left(range(2, 3 + math.ceil(rate / cutoff)), True, key=removes) if cutoff < 0.4 * rate else 0)
 
 
 def weights(half: int, place: float, rate: float, order: int = ORDER) -> Array:

@@ -32,6 +32,7 @@ DURATION = 1.0  # [s] duration of the push
 MIN_SHARE = 0.9  # estimated peak / peak of the push
 BEFORE, AFTER = 2.0, 1.0  # [s] before and after the push, in the trial on a joint at rest
 WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, in units of inertia * velocity noise / T_s
+MIN_TRIAL_RATE = 5000.0  # [Hz] in a trial, samples of a faster log are taken together
 BISECTIONS = 60  # halvings of the logarithmic search range
 CACHED_WALKS = 256  # size of a cache: all stages and logs of a joint need the same few results
 
@@ -80,15 +81,19 @@ def smallest_q_tau(
 ) -> float:
     """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push within `delay` [s].
 
-    A filter without a random walk does not use `q_tau`, so the search ends at one end of its range.
+    A filter without a random walk does not use `q_tau`, so the search ends at one end of its range.  n samples taken
+    together have the mean of n measurement errors, and the sum of n process errors.
     """
+    n = max(int(1.0 / T_s / MIN_TRIAL_RATE), 1)
+    root, T_s = float(np.sqrt(n)), n * T_s
+    noise = NoiseModel(noise.r_q / root, noise.r_dq / root, noise.q_q * root, noise.q_dq * root, 0.0)
     noise_effort = inertia * float(np.hypot(noise.q_dq, noise.r_dq)) / T_s
     low, high = (ratio * noise_effort for ratio in WALK_RANGE)
     for _ in range(BISECTIONS):
         middle = float(np.sqrt(low * high))
         share, late = push_response_at_rest(track, inertia, viscous, T_s, noise._replace(q_tau=middle))
         low, high = (low, middle) if share >= MIN_SHARE and late <= delay else (middle, high)
-    return high
+    return high / root
 
 
 def steady_std(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:

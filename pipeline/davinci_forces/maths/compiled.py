@@ -36,7 +36,7 @@ def compile_function(function: F, **options: Any) -> F:
     """Compile a function at its first call, in every process again."""
     from numba import njit
 
-    compiled: F = njit(**options)(function)
+    compiled: F = njit(no_cfunc_wrapper=True, **options)(function)
     return compiled
 
 

@@ -129,11 +129,13 @@ def shown_rows(t: Track) -> slice:
 
 def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
     """The external effort over time with its band, and measured minus modelled effort."""
-    shown, effort, sigma = shown_rows(t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
+    shown, effort, upper = shown_rows(t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
+    lower = effort - upper
+    upper += effort  # in place, as a column of a long log takes much memory
     marks: tuple[AnyMark, ...] = (
         *spans,
         Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-        Band(t.t[shown], (effort - sigma)[shown], (effort + sigma)[shown], "± 2 σ (total)", "sky"),
+        Band(t.t[shown], lower[shown], upper[shown], "± 2 σ (total)", "sky"),
         Line(t.t[shown], effort[shown], "smoother", "vermillion"),
     )
     return Panel("External effort", "time [s]", label(t, "tau_ext", "external effort"), marks)

@@ -1,26 +1,33 @@
 """Hashes of the code that a result depends on: modules and all modules of the pipeline that they import."""
 
-import hashlib
+import os
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache
-from os import sep
+from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
-from davinci_forces.files import digest
+from davinci_forces.files import read_bytes
 
 PACKAGE = Path(__file__).parents[2]
 IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 COMMENT = re.compile(r"#.*")
-_hash_of = cache(digest)  # of a module, which many tasks depend on
+
+
+class File(NamedTuple):
+    """A file of the package."""
+
+    sha256: str
+    imports: list[tuple[str, list[str]]]  # modules of the pipeline, and the names from them
+    by_name: bool  # whether it imports others by name
 
 
 @cache
 def package_fingerprint() -> str:
     """The fingerprint of the package's code, 12 digits: the same from a wheel and from a checkout."""
-    files = (file for file in PACKAGE.rglob("*") if file.is_file() and file.suffix != ".pyc")
-    listed = sorted(f"{digest(file)}  {file.relative_to(PACKAGE).as_posix()}\n" for file in files)
-    return hashlib.sha256("".join(listed).encode()).hexdigest()[:12]
+    listed = sorted(f"{file.sha256}  {name}\n" for name, file in _package().items())
+    return sha256("".join(listed).encode()).hexdigest()[:12]
 
 
 @cache
@@ -29,28 +36,24 @@ def code(*modules: str, without: str = "") -> dict[str, str]:
 
     Modules in the package `without` are left out, unless they are named.
     """
-    files: dict[Path, None] = {}
-    for module in modules:
-        _collect(_files(module), files)
-    named = {file for module in modules for file in _files(module)}
-    left_out = PACKAGE.joinpath(*without.split(".")[1:]) if without else None
-    hashed = (file for file in sorted(files, key=str) if file in named or not str(file).startswith(f"{left_out}{sep}"))
-    return {file.relative_to(PACKAGE).as_posix(): _hash_of(file) for file in hashed}
+    files: dict[str, None] = {}
+    named = [name for module in modules for name in _files(module)]
+    _collect(named, files)
+    left_out = (f"{_place(without)}/",) if without else ()
+    return {name: _package()[name].sha256 for name in sorted(files) if name in named or not name.startswith(left_out)}
 
 
-def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
-    for file in sources:
-        if file not in files:
-            files[file] = None
-            _collect(_imports(file), files)
+def _collect(names: Iterable[str], files: dict[str, None]) -> None:
+    for name in names:
+        if name not in files:
+            files[name] = None
+            _collect(_imports(name), files)
 
 
 @cache
-def _imports(file: Path) -> tuple[Path, ...]:
-    if file.suffix != ".py":
-        return ()
-    imports = find_imports(file.read_text(encoding="utf-8"))
-    return tuple(file for module, names in imports for n in names for file in _files(f"{module}.{n}") or _files(module))
+def _imports(file: str) -> tuple[str, ...]:
+    imports = ((module, name) for module, names in _package()[file].imports for name in names)
+    return tuple(file for module, name in imports for file in _files(f"{module}.{name}") or _files(module))
 
 
 def find_imports(source: str) -> Iterator[tuple[str, list[str]]]:
@@ -64,14 +67,31 @@ def find_imports(source: str) -> Iterator[tuple[str, list[str]]]:
 
 
 @cache
-def _files(module: str) -> list[Path]:
+def _files(module: str) -> list[str]:
     """The file of a module; for a package its `__init__`, or all its files if that imports modules by name."""
-    place = PACKAGE.joinpath(*module.split(".")[1:])
-    if place.with_suffix(".py").is_file():
-        return [place.with_suffix(".py")]
-    if place == PACKAGE or not place.is_dir():
+    place, package = _place(module), _package()
+    if f"{place}.py" in package:
+        return [f"{place}.py"]
+    init = f"{place}/__init__.py"
+    if init not in package:
         return []
-    init = place / "__init__.py"
-    if init.is_file() and "import_module" not in init.read_text(encoding="utf-8"):
-        return [init]
-    return sorted(f for f in place.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
+    return [name for name in package if name.startswith(f"{place}/")] if package[init].by_name else [init]
+
+
+def _place(module: str) -> str:
+    """The path of a module below the package, without ending."""
+    return module.partition(".")[2].replace(".", "/")
+
+
+@cache
+def _package() -> dict[str, File]:
+    """All files of the package, each read once, by their paths below it."""
+    files = {}
+    for folder, _, names in os.walk(PACKAGE):  # takes a third of the time of rglob
+        place = folder.removeprefix(str(PACKAGE)).replace(os.sep, "/").lstrip("/")
+        for name in names if not place.endswith("__pycache__") else ():
+            content = read_bytes(f"{folder}{os.sep}{name}")
+            source = content.decode() if name.endswith(".py") else ""
+            file = File(sha256(content).hexdigest(), [*find_imports(source)], "import_module" in source)
+            files[f"{place}/{name}".lstrip("/")] = file
+    return dict(sorted(files.items()))

@@ -36,7 +36,7 @@ def run(
     filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)
     parts = filter_inputs(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))
     estimate = filter_parts(SMOOTHER, parts, filter_noise, ("tau_ext", "tau_ext_std", "nis"))
-    if diverges(estimate):
+    if diverges(estimate.tau_ext, float(np.mean(estimate.nis))):
         return
     samples = np.flatnonzero(free)
     rows = evenly(len(samples), MAX_ROWS_BAND)

@@ -42,8 +42,8 @@ def track_effort(
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
     is_long = len(model) > BLOCK_SAMPLES  # then the filter runs once more, block by block, to take less memory
     estimate = filter_parts(DEFAULT, parts, noise, ("tau_ext", "tau_ext_std", "nis") if is_long else Tracked._fields)
-    if diverges(estimate):
-        yield divergence_warning(model, float(np.mean(estimate.nis)))
+    if diverges(estimate.tau_ext, nis := float(np.mean(estimate.nis))):
+        yield divergence_warning(model, nis)
         if not np.isfinite(estimate.tau_ext).all():
             return
     if offset.drifts:

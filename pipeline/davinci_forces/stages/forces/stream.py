@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, filter_parts
+from davinci_forces.filters import DEFAULT, diverges, filter_blocks
 from davinci_forces.filters.online import Window, delay_of
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
@@ -70,12 +70,13 @@ def run(
             noise = noises[model.joint]
             filter_noise = noise_model(noise, robot.joint(model.joint), 1.0 / model.rate, q_tau)
             parts = filter_inputs(along.with_fit(model, fit))
-            estimate = filter_parts(DEFAULT, parts, filter_noise, ("tau_ext", "nis"))
-            del parts
-            if not diverges(estimate):
-                tau_ext = estimate.tau_ext
+            tau_ext, nis = np.empty(len(model)), 0.0
+            for rows, tracked in filter_blocks(DEFAULT, parts, filter_noise):
+                tau_ext[rows] = tracked.tau_ext
+                nis += float(np.sum(tracked.nis)) / len(model)
+            del parts, tracked
+            if not diverges(tau_ext, nis):
                 tau_ext -= track.day_offset
-                del estimate
                 yield from compare(track, tau_ext, found, entry, late, noise.delay)
 
 
