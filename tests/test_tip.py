@@ -108,6 +108,20 @@ def test_the_stated_deviation_is_by_how_much_the_force_is_off():
     assert (np.abs(found - [3.0, -4.0, 12.0]) < 4 * std).all()
 
 
+def test_the_deviation_of_a_peak_holds_what_the_smoother_rounds_off_it():
+    """As of a contact's peak (TIP_REACH): of a triangle under exponential weights of either side, all of it."""
+    rise = 0.2  # [s]
+    weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE * 2 / rise)
+    rounded = np.column_stack([np.convolve(x, weights / weights.sum(), "same") for x in PUSH.T])
+    exact, smooth = (
+        run("davinci", [replace(track, smooth_rise=rise * k) for track in tracks("davinci", efforts("davinci", f))])
+        for k, f in ((0.0, rounded), (1.0, rounded))
+    )
+    lost = smooth[TipContact].f_peak_std[0] ** 2 - exact[TipContact].f_peak_std[0] ** 2
+    assert np.sqrt(lost) == pytest.approx(13.0 - smooth[TipContact].f_peak[0], rel=0.25)
+    assert smooth[TipContact].f_z_std[0] > exact[TipContact].f_z_std[0]
+
+
 def test_joints_whose_errors_go_together_blur_the_force_in_another_direction():
     R = matrix(0.6, -0.3, 0.2)
     rows = {"rho_12": [0.6, 0.6, -0.9], "rho_13": [-0.3, -0.3, 0.9], "rho_23": [0.2, 0.2, 0.9]}

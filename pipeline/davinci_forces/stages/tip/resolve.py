@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
+from davinci_forces.maths.contact.detection import TIP_REACH
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -202,8 +203,10 @@ def tip_contacts(
     C = np.stack([
         [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
     ])[..., at].transpose(2, 0, 1)  # fmt: skip
+    sigma_std = half_axes_std(force, tracks, chain, at, tip_force.sigma_ellipsoid(C)[0])
+    lost = rounded_off(force.t, f, at, TIP_REACH * max(track.smooth_rise for track in tracks))
+    C = C + lost[:, :, None] * lost[:, None, :]
     sigma, axes = tip_force.sigma_ellipsoid(C)
-    sigma_std = half_axes_std(force, tracks, chain, at, sigma)
     std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
     yield TipContact(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
@@ -214,6 +217,11 @@ def tip_contacts(
         weak_z=axes[:, 0, 2], x=force.x[at], y=force.y[at], z=force.z[at], condition=force.condition[at],
         near_singular=force.near_singular[at],
     )  # fmt: skip
+
+
+def rounded_off(t: Array, f: Array, at: Integers, reach: float) -> Array:
+    """What the smoother rounds off the force f (N, 3) at samples (K,), as off the peak of an effort (K, 3)."""
+    return np.array([f[k] - np.nanmean(f[np.abs(t - t[k]) <= reach], axis=0) for k in at])
 
 
 def half_axes_std(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
