@@ -104,7 +104,7 @@ def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random
 
 @pytest.mark.slow
 def test_five_starts_of_the_da_vinci_agree():
-    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles())
+    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles(), samples=300)
     assert np.ptp(design_together(problem, 5, 0).optima) <= 0.02
 
 
