@@ -80,12 +80,12 @@ def _loop(model: States, recording: Recording) -> Callable[..., Any]:
     """
     x, P, R, Phi, Q, in_q, in_dq, order, doubts, forgets = model
     zeros = max(MIN_STATES - len(x), 0) if recording.samples < MIN_SAMPLES_OWN_LOOP else 0
-    P, Phi, Q = (np.pad(A, (0, zeros)) for A in (P, Phi, Q))
     if zeros:
+        P, Phi, Q = (np.pad(A, (0, zeros)) for A in (P, Phi, Q))
         in_q, in_dq = (*in_q, len(x))[:2], (*in_dq, len(x))[:2]
     x, (R_q, R_dq), h = (*x, *[0.0] * zeros), R.tolist(), 0.5 * recording.T_s**2 * (order - 1)
     adapted = np.array([R_q, R_dq, 0.0, 0.0])
-    return partial(_pass, x, np.array(x), P, adapted, in_q, in_dq, R_q, R_dq, Phi, Q, h, float(doubts), forgets)
+    return partial(_pass, x, np.array(x), P.copy(), adapted, in_q, in_dq, R_q, R_dq, Phi, Q, h, float(doubts), forgets)
 
 
 @compile_and_store
