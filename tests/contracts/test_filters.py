@@ -157,7 +157,7 @@ def test_the_filter_of_any_number_of_states_is_the_textbooks(n: int, order: int)
         model.P[3:, 3:], model.Q[3:, 3:] = 0.5 * np.eye(n - 3), 1e-3 * np.eye(n - 3)
     if n > 4:
         model = model._replace(in_q=(0, 3), in_dq=(1, 4), R=0.5 * model.R)
-    made, (expected, total) = kalman.run_filter(run, model), textbook(y, tau, model)
+    [(_, made)], (expected, total) = kalman.run_blocks(run, model), textbook(y, tau, model)
     assert_allclose(made[2:6], expected, rtol=1e-6, atol=1e-9)
     assert kalman.log_likelihood(run, model, 0) == pytest.approx(total, rel=1e-8)
 

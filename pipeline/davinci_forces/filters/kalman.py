@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.filters.ekf import LOG_2_PI
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, join_blocks
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
 from davinci_forces.filters.stepping import columns, covariances, transition
 from davinci_forces.maths.arrays import Array
@@ -54,13 +54,8 @@ def states(recording: Recording, noise: NoiseModel, n: int = 3) -> States:
     return States((*x, *others), P, np.array([R_q, R_dq]), np.eye(n), Q)
 
 
-def run_filter(recording: FilterInput, model: States) -> Array:
-    """Compute the columns of `Tracked` (7, N): correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
-    return np.array(join_blocks(run_blocks(recording, model), recording.samples))
-
-
 def run_blocks(recording: Recording, model: States) -> Iterator[Block]:
-    """Compute the columns of `Tracked` block by block."""
+    """Compute the columns of `Tracked` block by block: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     run = _loop(model, recording)
     for rows, part in input_blocks(recording):
         out = np.empty((7, part.samples))

@@ -53,7 +53,13 @@ Recording = FilterInput | LongInput
 
 def input_blocks(recording: Recording) -> Iterator[tuple[slice, FilterInput]]:
     """Yield the samples of a recording in blocks."""
-    return ((rows, recording.part(rows)) for rows in row_blocks(recording.samples))
+    return ((rows, recording.part(rows)) for rows in block_rows(recording))
+
+
+def block_rows(recording: Recording) -> list[slice]:
+    """Return the samples of each block of a recording; what is in memory is one block."""
+    N = recording.samples
+    return [slice(0, N)] if isinstance(recording, FilterInput) else row_blocks(N)
 
 
 def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
@@ -111,10 +117,11 @@ def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked.
 
 
 def whole(blocks: BlockFilter) -> Filter:
-    """Return the filter of a whole recording, from one that filters it block by block."""
+    """Return the filter of a recording in memory, from one that filters it block by block."""
 
     def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-        return join_blocks(blocks(recording, noise), recording.samples)
+        [(_, tracked)] = blocks(recording, noise)
+        return tracked
 
     return track
 

@@ -31,8 +31,8 @@ class Noise(NamedTuple):
 
 def innovations(recording: FilterInput, noise: Noise) -> tuple[Array, Array]:
     """Compute the innovations of position and velocity (N,)."""
-    _, _, _, _, i_q, i_dq, _ = kalman.run_filter(recording, states(recording, noise))
-    return i_q, i_dq
+    [(_, tracked)] = kalman.run_blocks(recording, states(recording, noise))
+    return tracked.innovation_q, tracked.innovation_dq
 
 
 def log_likelihood(recording: FilterInput, noise: Noise) -> float:
