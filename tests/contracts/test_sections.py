@@ -348,6 +348,10 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, [], found)
     assert f"**{sum(map(len, found))} contacts found above the alarm level; the study states none. Largest: " in said
+    ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
+    number = sum(map(len, ones))
+    windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
+    assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, [], ones)
     about = context(lab, without(catalogue, Contact))
     assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
         about, [], []

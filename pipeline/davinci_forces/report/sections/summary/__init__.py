@@ -138,7 +138,9 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
     )
-    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level."
+    peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
+    fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
+    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level{fewer}."
     return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
 
 
