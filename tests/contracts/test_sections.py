@@ -358,6 +358,29 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     )
 
 
+@pytest.mark.parametrize("worst", ["push", "tip"])
+def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_only_if_stated(
+    lab: Lab, catalogue: Catalogue, worst: str
+):
+    [push] = catalogue.select(Contact, log="push", joint="hand_roll")
+    [tip] = catalogue.select(Contact, log="tip", joint="hand_roll")
+    touched = [
+        replace(c, joint=joint, above=1 + 0 * c.above) for c in (push, tip) for joint in ("hand_roll", "hand_pitch")
+    ]
+    errors = [
+        replace(p, model_error=2.0 if p.log == worst else 1.0) for p in catalogue.select(Prediction, joint="hand_roll")
+    ]
+    records = {Contact: touched, Prediction: errors}
+    shown = Catalogue(lambda kind: records.get(kind) or catalogue.records(kind))
+    about = replace(context(lab, catalogue), catalogue=shown)
+    panels = list(summary.effort_panel(about, parts.trust(about, "hand_roll")))
+    assert panels[0].title == f"Hand roll, {worst}"
+    assert "contact windows shaded" in summary.caption(touched, panels)
+    unstated = replace(lab.study, logs=tuple(replace(log, contact=()) for log in lab.study.logs))
+    panels = list(summary.effort_panel(replace(about, study=unstated), parts.trust(about, "hand_roll")))
+    assert "shaded" not in summary.caption(touched, panels)
+
+
 @pytest.mark.parametrize(("period", "advice"), [(1, " The arm may not yet have settled: set `skip`."), (3, "")])
 def test_a_period_that_is_noisier_than_the_others_is_named(lab: Lab, catalogue: Catalogue, period: int, advice: str):
     average = catalogue.select(Average, log="again")[0]

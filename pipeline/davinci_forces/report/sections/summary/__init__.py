@@ -76,7 +76,7 @@ def blocks(context: Context) -> Iterator[Block]:
         # What is left on page one beside the table and lines of results.
         room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (len(lines) + max(len(panels) - MAX_IN_COLUMN, 0))
         yield Figure(
-            caption(contacts),
+            caption(contacts, panels),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(in_column(panels)),
             label="answer-figure",
@@ -101,13 +101,15 @@ def rule_in_words(trusts: list[Trust]) -> str:
     return f"{worst} Verdicts follow from {rule}, by [@thresholds]."
 
 
-def caption(contacts: list[Contact]) -> str:
+def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     """The caption of the figure."""
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Of the logs in which only this joint is touched (else of all), that with the largest model error is shown."
-    shaded = ", contact windows shaded" if any(contact.stated.any() for contact in contacts) else ""
+    shaded = (
+        ", contact windows shaded" if any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks) else ""
+    )
     return f"External effort of each joint{shaded}. {which} {level}"
 
 
@@ -173,8 +175,9 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     contacts = context.catalogue.select(Contact, joint=trusted.joint)
     errors = {p.log: p.model_error for p in context.catalogue.select(Prediction, joint=trusted.joint)}
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
-    logs = sorted((log for log, joints in touched.items() if len(joints) == 1), key=lambda log: errors.get(log, 0.0))
-    logs = logs or list(touched) or ([trusted.space.log] if trusted.space is not None else [])
+    by_error = sorted(touched, key=lambda log: errors.get(log, 0.0))
+    logs = [log for log in by_error if len(touched[log]) == 1] or by_error
+    logs = logs or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
