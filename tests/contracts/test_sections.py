@@ -37,6 +37,7 @@ from davinci_forces.report.content import (
     Listing,
     Number,
     OnScreen,
+    Points,
     Prose,
     Section,
     Table,
@@ -364,6 +365,7 @@ def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_onl
 ):
     [push] = catalogue.select(Contact, log="push", joint="hand_roll")
     [tip] = catalogue.select(Contact, log="tip", joint="hand_roll")
+    push = replace(push, found=np.arange(len(push)) == 0)  # a window without a contact gets no name
     touched = [
         replace(c, joint=joint, above=1 + 0 * c.above) for c in (push, tip) for joint in ("hand_roll", "hand_pitch")
     ]
@@ -373,11 +375,16 @@ def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_onl
     records = {Contact: touched, Prediction: errors}
     shown = Catalogue(lambda kind: records.get(kind) or catalogue.records(kind))
     about = replace(context(lab, catalogue), catalogue=shown)
-    panels = list(summary.effort_panel(about, parts.trust(about, "hand_roll")))
+    trusted = parts.trust(about, "hand_roll")
+    panels = list(summary.effort_panel(about, trusted))
     assert panels[0].title == f"Hand roll, {worst}"
+    assert [len(mark.x) for mark in panels[0].marks if isinstance(mark, Points)] == [1]
     assert "contact windows shaded" in summary.caption(touched, panels)
-    unstated = replace(lab.study, logs=tuple(replace(log, contact=()) for log in lab.study.logs))
-    panels = list(summary.effort_panel(replace(about, study=unstated), parts.trust(about, "hand_roll")))
+    logs = tuple(replace(log, contact=() if log.name == worst else log.contact) for log in lab.study.logs)
+    panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
+    assert worst not in panels[0].title  # an error that holds the pushes is none of the model
+    logs = tuple(replace(log, contact=()) for log in lab.study.logs)
+    panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
     assert "shaded" not in summary.caption(touched, panels)
 
 
