@@ -137,6 +137,16 @@ def test_a_triangle_has_its_peak_mean_and_impulse():
     assert found.impulse_std == pytest.approx(2.0 * found.mean_std)
 
 
+@pytest.mark.parametrize("rate", [20.0, 50.0, 1000.0])
+@pytest.mark.parametrize("start", [9.5, 9.513])
+def test_an_impulse_does_not_depend_on_the_rate_or_on_where_the_window_meets_the_samples(rate: float, start: float):
+    t = np.arange(0.0, 20.0, 1.0 / rate)
+    push = np.where(np.abs(t - 10.0) < 0.25, np.cos(np.pi * (t - 10.0) / 0.5), 0.0)
+    for effort, impulse in ((push, 1.0 / np.pi), (np.full(len(t), 2.0), 2.0)):  # .5 s of a half-sine, a constant
+        summary = summarise(t, (effort, 0.0 * t), (start, start + 1.0), t < 5.0, rise=0.1)
+        assert summary.impulse == pytest.approx(impulse, rel=0.01)
+
+
 def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
     """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
     weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)

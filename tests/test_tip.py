@@ -122,6 +122,27 @@ def test_the_deviation_of_a_peak_holds_what_the_smoother_rounds_off_it():
     assert smooth[TipContact].f_z_std[0] > exact[TipContact].f_z_std[0]
 
 
+def test_what_is_rounded_off_each_joint_follows_from_its_own_rise():
+    plain = tracks("davinci", efforts("davinci", PUSH * [1.0, 0.0, 0.0]))  # a force of the roll, almost alone
+    slow = [replace(track, smooth_rise=0.2 if track.joint != "hand_roll" else 0.0) for track in plain]
+    exact, other = (run("davinci", each)[TipContact].f_x_std[0] for each in (plain, slow))
+    assert other == pytest.approx(exact, rel=0.02)
+
+
+def test_what_is_rounded_off_is_counted_once_and_is_as_uncertain_as_the_force():
+    rounding = np.exp(-np.abs(T - 10.0))
+    plain = [replace(track, smooth_rise=0.2) for track in tracks("davinci", efforts("davinci", PUSH))]
+    in_band = [
+        replace(track, tau_ext_rounding=rounding, tau_ext_smooth_std=np.hypot(std, rounding))
+        for track, std in zip(plain, STD, strict=True)
+    ]
+    at_rest = run("davinci", [replace(track, smooth_rise=0.0) for track in plain])[TipContact]
+    once, again = (run("davinci", each)[TipContact] for each in (plain, in_band))
+    np.testing.assert_allclose(again.f_peak_std, once.f_peak_std, rtol=1e-12)
+    np.testing.assert_allclose(again.sigma_1_std, once.sigma_1_std, rtol=1e-12)
+    assert 0.5 * at_rest.sigma_3[0] < once.sigma_1_std[0] < 1.5 * at_rest.sigma_1[0] < once.sigma_1[0]
+
+
 def test_joints_whose_errors_go_together_blur_the_force_in_another_direction():
     R = matrix(0.6, -0.3, 0.2)
     rows = {"rho_12": [0.6, 0.6, -0.9], "rho_13": [-0.3, -0.3, 0.9], "rho_23": [0.2, 0.2, 0.9]}

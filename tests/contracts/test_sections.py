@@ -37,6 +37,7 @@ from davinci_forces.report.content import (
     Listing,
     Number,
     OnScreen,
+    Points,
     Prose,
     Section,
     Table,
@@ -348,10 +349,43 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, [], found)
     assert f"**{sum(map(len, found))} contacts found above the alarm level; the study states none. Largest: " in said
+    ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
+    number = sum(map(len, ones))
+    windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
+    assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, [], ones)
     about = context(lab, without(catalogue, Contact))
     assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
         about, [], []
     )
+
+
+@pytest.mark.parametrize("worst", ["push", "tip"])
+def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_only_if_stated(
+    lab: Lab, catalogue: Catalogue, worst: str
+):
+    [push] = catalogue.select(Contact, log="push", joint="hand_roll")
+    [tip] = catalogue.select(Contact, log="tip", joint="hand_roll")
+    push = replace(push, found=np.arange(len(push)) == 0)  # a window without a contact gets no name
+    touched = [
+        replace(c, joint=joint, above=1 + 0 * c.above) for c in (push, tip) for joint in ("hand_roll", "hand_pitch")
+    ]
+    errors = [
+        replace(p, model_error=2.0 if p.log == worst else 1.0) for p in catalogue.select(Prediction, joint="hand_roll")
+    ]
+    records = {Contact: touched, Prediction: errors}
+    shown = Catalogue(lambda kind: records.get(kind) or catalogue.records(kind))
+    about = replace(context(lab, catalogue), catalogue=shown)
+    trusted = parts.trust(about, "hand_roll")
+    panels = list(summary.effort_panel(about, trusted))
+    assert panels[0].title == f"Hand roll, {worst}"
+    assert [len(mark.x) for mark in panels[0].marks if isinstance(mark, Points)] == [1]
+    assert "contact windows shaded" in summary.caption(touched, panels)
+    logs = tuple(replace(log, contact=() if log.name == worst else log.contact) for log in lab.study.logs)
+    panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
+    assert worst not in panels[0].title  # an error that holds the pushes is none of the model
+    logs = tuple(replace(log, contact=()) for log in lab.study.logs)
+    panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
+    assert "shaded" not in summary.caption(touched, panels)
 
 
 @pytest.mark.parametrize(("period", "advice"), [(1, " The arm may not yet have settled: set `skip`."), (3, "")])

@@ -123,7 +123,7 @@ def test_the_next_report_shows_ratings_as_text_and_says_when_numbers_changed_sin
     call("report", finished)
     page = (reports / "report.html").read_text()
     assert "The numbers have changed since 1 rating of 2" in page
-    assert "figure gone, no longer here" in page
+    assert "figure gone, not in this report" in page
     (finished / "review.toml").write_text("[[rating]]\n")
     assert "give what is rated" in call("report", finished, code=1)
 

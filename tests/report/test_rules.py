@@ -1,15 +1,27 @@
 """What sections compute and decide, on small records whose answer is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.records import FrictionMap, Pose, Residual, Stiffness, Track, Whiteness
+from davinci_forces.records import (
+    Average,
+    FrictionMap,
+    PeriodResidual,
+    Pose,
+    Residual,
+    Signal,
+    Stiffness,
+    Track,
+    Whiteness,
+)
 from davinci_forces.report.sections.innovations import over_time
 from davinci_forces.report.sections.joints.friction import curves
 from davinci_forces.report.sections.joints.friction import in_words as friction_in_words
 from davinci_forces.report.sections.joints.residuals import in_words, motion_panel
-from davinci_forces.report.sections.noise import histogram
+from davinci_forces.report.sections.noise import histogram, outliers
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot
 from davinci_forces.report.sections.robot import links_in_space
 from davinci_forces.report.sections.tissue import spread, spread_panel, surface_map
@@ -100,6 +112,22 @@ def test_a_histogram_holds_all_samples_beside_the_density_of_a_normal_distributi
     assert grid[np.argmax(normal)] == pytest.approx(2.0, abs=0.05)
     assert normal.max() == pytest.approx(1.0 / (0.5 * np.sqrt(2 * np.pi)), rel=0.05)
     assert np.isfinite(histogram(np.ones(10))[3]).all()
+
+
+@pytest.mark.parametrize(("velocity", "remarked"), [("logged", True), ("derived", False)])
+def test_a_period_is_not_blamed_for_a_derived_velocity_which_errs_at_the_end_of_a_log(velocity, remarked):
+    t = np.arange(500) / 100.0
+    noise = np.where(t < 4.95, 0.1, 5.0)
+    records = {
+        PeriodResidual: record(
+            PeriodResidual, 500, t=t, q_noise=0.0 * t + 1.0, dq_noise=noise, tau_noise=0.0 * t + 1.0
+        ),
+        Signal: record(Signal, 500, velocity=velocity),
+    }
+    context = SimpleNamespace(catalogue=SimpleNamespace(select=lambda kind, **_: [records[kind]]))
+    verdicts = list(outliers(context, record(Average, 100, period=1.0, periods=5)))
+    assert bool(verdicts) == remarked
+    assert not remarked or "velocity noise of period 5 of 5" in verdicts[0].text
 
 
 def test_a_normal_sample_lies_on_the_line_of_its_plot_whose_slope_is_the_standard_deviation():

@@ -180,7 +180,10 @@ def summarise(
     inside = tau_ext[within]
     if not len(inside):
         return None
-    duration, mean = end - start, float(inside.mean())
+    duration, edges = end - start, np.concatenate([[start], 0.5 * (t[within][1:] + t[within][:-1]), [end]])
+    # Each sample counts for the time around it, within window and log.
+    shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
+    mean = float(np.average(inside, weights=shares))
     constant = 0.0 if constant_std is None else float(constant_std[within].mean())
     beside = ~within & (t >= start - TIP_REACH * rise) & (t <= end + TIP_REACH * rise)
     spread_out = float(tau_ext[beside].sum() / len(inside))

@@ -88,9 +88,13 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 
 def outliers(context: Context, average: Average) -> Iterator[Verdict]:
-    """Periods that are noisier than the others."""
-    for residual in context.catalogue.select(PeriodResidual, log=average.log, joint=average.joint):
+    """Periods that are noisier than the others; a derived velocity errs at the ends of a log, whatever the arm does."""
+    about = {"log": average.log, "joint": average.joint}
+    derived = any(signal.velocity == "derived" for signal in context.catalogue.select(Signal, **about))
+    for residual in context.catalogue.select(PeriodResidual, **about):
         for signal, meaning in NOISE_FIELDS.items():
+            if derived and signal == "dq_noise":
+                continue
             rms = by_period(residual, average, getattr(residual, signal))
             noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MAX_PERIOD_NOISE * np.median(rms)]
             if noisy:

@@ -78,11 +78,15 @@ def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int 
 
 def trust(context: Context, joint: str) -> Trust:
     """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
+    run, about = decisive(scored_predictions(context, joint), context.catalogue.select(PathShare, joint=joint))
+    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
+
+
+def scored_predictions(context: Context, joint: str) -> list[Prediction]:
+    """The predictions of a joint by the fit that the filter uses, where a contact log says when it is touched."""
     fits = context.predicting_fits(joint)
     scored = [p for p in context.catalogue.select(Prediction, joint=joint) if f"{p.model}.{p.estimator}" in fits]
-    scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
-    run, about = decisive(scored, context.catalogue.select(PathShare, joint=joint))
-    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
+    return [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
 
 
 def run_name(log: str, joint: str) -> str:

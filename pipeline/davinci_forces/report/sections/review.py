@@ -46,4 +46,4 @@ def subject(context: Context, rating: Rating) -> str:
     if rating.subject == "figure" and rating.name in context.labels:
         return f"[@{rating.name}]"
     here = rating.subject == "run" and rating.name in [log.name for log in context.study.logs]
-    return f"{rating.subject} {literal(rating.name)}{'' if here else ', no longer here'}"
+    return f"{rating.subject} {literal(rating.name)}{'' if here else ', not in this report'}"

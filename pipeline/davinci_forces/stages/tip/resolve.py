@@ -200,12 +200,7 @@ def tip_contacts(
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
-    C = np.stack([
-        [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
-    ])[..., at].transpose(2, 0, 1)  # fmt: skip
-    sigma_std = half_axes_std(force, tracks, chain, at, tip_force.sigma_ellipsoid(C)[0])
-    lost = rounded_off(force.t, f, at, TIP_REACH * max(track.smooth_rise for track in tracks))
-    C = C + lost[:, :, None] * lost[:, None, :]
+    C, sigma_std = peak_errors(force, tracks, chain, at)
     sigma, axes = tip_force.sigma_ellipsoid(C)
     std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
     yield TipContact(
@@ -219,23 +214,33 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def rounded_off(t: Array, f: Array, at: Integers, reach: float) -> Array:
-    """What the smoother rounds off the force f (N, 3) at samples (K,), as off the peak of an effort (K, 3)."""
-    return np.array([f[k] - np.nanmean(f[np.abs(t - t[k]) <= reach], axis=0) for k in at])
+def rounded_off(track: Track, at: Integers) -> Array:
+    """What the smoother rounds off an effort at samples (K,), as off the peak of a contact (K,)."""
+    x, reach = track.tau_ext_smooth, TIP_REACH * track.smooth_rise
+    return np.array([x[k] - x[np.abs(track.t - track.t[k]) <= reach].mean() for k in at])
 
 
-def half_axes_std(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
-    """Standard errors (K, 3) of the half-axes at samples (K,), from the error of each joint's model variance."""
+def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers) -> tuple[Array, Array]:
+    """Covariance (K, 3, 3) of the force at peaks (K,) with what is rounded off, and errors (K, 3) of its half-axes.
+
+    They err by each joint's model variance, and what is rounded off is as uncertain as the rest of the force.
+    """
     J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
-    std = np.stack([track.tau_ext_smooth_std[at] for track in tracks], axis=-1)
+    total = np.stack([track.tau_ext_smooth_std[at] for track in tracks], axis=-1)
+    std = np.sqrt(total**2 - np.stack([track.tau_ext_rounding[at] for track in tracks], axis=-1) ** 2)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
-    squares = np.zeros(sigma.shape)
+    rounded = np.column_stack([rounded_off(track, at) for track in tracks])
+    lost, C = tip_force.from_efforts(J, rounded, tip_force.covariance(std, rho))
+    squares, half_axes = np.zeros(std.shape), tip_force.sigma_ellipsoid(C)[0]
     for i, track in enumerate(tracks):
         wider = std.copy()
         wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
-        _, C = tip_force.from_efforts(J, np.zeros(std.shape), tip_force.covariance(wider, rho))
-        squares += (tip_force.sigma_ellipsoid(C)[0] - sigma) ** 2
-    return np.asarray(np.sqrt(squares))
+        _, C_wider = tip_force.from_efforts(J, rounded, tip_force.covariance(wider, rho))
+        squares += (tip_force.sigma_ellipsoid(C_wider)[0] - half_axes) ** 2
+    C_peak = C + lost[:, :, None] * lost[:, None, :]
+    sigma, axes = tip_force.sigma_ellipsoid(C_peak)
+    share = np.einsum("nki,ni->nk", axes, lost) / np.maximum(sigma, np.finfo(float).tiny)
+    return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes))
 
 
 def peak_sample(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:

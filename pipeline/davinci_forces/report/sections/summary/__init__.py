@@ -23,7 +23,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import trust
+from davinci_forces.report.sections.parts import scored_predictions, trust
 from davinci_forces.report.sections.summary.opening import (
     as_list,
     logs_in_words,
@@ -76,7 +76,7 @@ def blocks(context: Context) -> Iterator[Block]:
         # What is left on page one beside the table and lines of results.
         room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (len(lines) + max(len(panels) - MAX_IN_COLUMN, 0))
         yield Figure(
-            caption(contacts),
+            caption(contacts, panels),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(in_column(panels)),
             label="answer-figure",
@@ -101,13 +101,14 @@ def rule_in_words(trusts: list[Trust]) -> str:
     return f"{worst} Verdicts follow from {rule}, by [@thresholds]."
 
 
-def caption(contacts: list[Contact]) -> str:
+def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     """The caption of the figure."""
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
-    which = "Of the logs in which only this joint is touched (else of all), that with the largest model error is shown."
-    shaded = ", contact windows shaded" if any(contact.stated.any() for contact in contacts) else ""
+    which = "Of the contact logs that touch only this joint (else of all), that with the largest model error is shown."
+    is_shaded = any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks)
+    shaded = ", contact windows shaded" if is_shaded else ""
     return f"External effort of each joint{shaded}. {which} {level}"
 
 
@@ -138,7 +139,9 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
     )
-    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level."
+    peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
+    fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
+    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level{fewer}."
     return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
 
 
@@ -169,17 +172,18 @@ def efforts_in_words(context: Context) -> str:
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
     contacts = context.catalogue.select(Contact, joint=trusted.joint)
-    errors = {p.log: p.model_error for p in context.catalogue.select(Prediction, joint=trusted.joint)}
+    errors = {p.log: p.model_error for p in scored_predictions(context, trusted.joint)}
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
-    logs = sorted((log for log, joints in touched.items() if len(joints) == 1), key=lambda log: errors.get(log, 0.0))
-    logs = logs or list(touched) or ([trusted.space.log] if trusted.space is not None else [])
+    by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
+    logs = [log for log in by_error if len(touched[log]) == 1] or by_error
+    logs = logs or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
         converged = track.t - track.t[0] >= 1.0
         line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
-        peaks = [named_peaks(track, c) for c in contacts if c.log == track.log]
+        peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
         yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
@@ -194,12 +198,12 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 
 def named_peaks(track: Track, contact: Contact) -> Points:
-    """The peak in each window, with its value."""
-    places = []
-    for start, end in zip(contact.onset, contact.release, strict=True):
+    """The peak of each contact that was found, with its value."""
+    places, rows = [], contact.found > 0
+    for start, end in zip(contact.onset[rows], contact.release[rows], strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
-    names = tuple(f"{p:+.3g}" for p in contact.peak)
+    names = tuple(f"{p:+.3g}" for p in contact.peak[rows])
     return Points(track.t[places], track.tau_ext_smooth[places], "", "black", names=names)
 
 
