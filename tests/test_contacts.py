@@ -48,6 +48,7 @@ def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_re
     zero = np.zeros_like(T)
     efforts = {
         "tau_ext": tau_ext,
+        "tau_ext_direct": tau_ext,
         "tau_ext_smooth": tau_ext,
         "tau_ext_std": zero + std,
         "tau_ext_smooth_std": zero + std,
@@ -127,7 +128,9 @@ def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_o
 def test_a_triangle_has_its_peak_mean_and_impulse():
     push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
     free = free_space(T, [(9.0, 11.0)], RATE)
-    found = summarise(T, (noise(std=0.02) + push, np.full(len(T), 0.05)), (9.0, 11.0), free, rise=0.0)
+    found = summarise(
+        T, (noise(std=0.02) + push, np.full(len(T), 0.05), noise(std=0.02) + push), (9.0, 11.0), free, rise=0.0
+    )
     assert found.peak == pytest.approx(3.0, abs=4 * 0.02)
     assert found.mean == pytest.approx(1.5, abs=0.02)
     assert found.impulse == pytest.approx(3.0, abs=0.04)
@@ -143,7 +146,7 @@ def test_an_impulse_does_not_depend_on_the_rate_or_on_where_the_window_meets_the
     t = np.arange(0.0, 20.0, 1.0 / rate)
     push = np.where(np.abs(t - 10.0) < 0.25, np.cos(np.pi * (t - 10.0) / 0.5), 0.0)
     for effort, impulse in ((push, 1.0 / np.pi), (np.full(len(t), 2.0), 2.0)):  # .5 s of a half-sine, a constant
-        summary = summarise(t, (effort, 0.0 * t), (start, start + 1.0), t < 5.0, rise=0.1)
+        summary = summarise(t, (effort, 0.0 * t, effort), (start, start + 1.0), t < 5.0, rise=0.1)
         assert summary.impulse == pytest.approx(impulse, rel=0.01)
 
 
@@ -151,7 +154,9 @@ def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
     """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
     weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)
     smooth = np.convolve(3.0 * np.clip(1 - np.abs(T - 10.0), 0, None), weights / weights.sum(), "same")
-    found = summarise(T, (smooth, np.full(len(T), 0.01)), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2)
+    found = summarise(
+        T, (smooth, np.full(len(T), 0.01), smooth), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2
+    )
     assert 3.0 - found.peak == pytest.approx(0.3, rel=0.05)
     assert found.peak_std == pytest.approx(3.0 - found.peak, rel=0.1)
 
@@ -160,7 +165,7 @@ def test_a_bias_in_free_space_makes_means_uncertain_however_long_they_are():
     free = np.ones(len(T), bool)
     assert mean_size(noise() + 0.5, free, 1000) == pytest.approx(0.5, abs=0.02)
     assert np.isnan(mean_size(noise(), ~free, 10))
-    assert summarise(T, (noise(), noise() ** 2), (100.0, 101.0), free, 0.0) is None
+    assert summarise(T, (noise(), noise() ** 2, noise()), (100.0, 101.0), free, 0.0) is None
 
 
 def test_free_space_leaves_out_what_still_settles():
@@ -202,14 +207,20 @@ def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows
     assert (len(contact), contact.found[0], contact.above[0]) == (1, 1, 1)
 
 
-def test_the_deviation_of_a_mean_holds_what_the_smoother_spreads_out_of_the_window():
-    t, rise = np.arange(2000) / 100.0, 0.2  # [s]
-    weights = np.exp(-np.abs(np.arange(-200, 201)) / 100.0 * 4.0 * np.log(2.0) / rise)
-    pulse = np.where((t >= 10.0) & (t <= 12.5), 2.0, 0.0)
-    smooth = np.convolve(pulse, weights / weights.sum(), "same")
-    summary = summarise(t, (smooth, np.zeros(2000)), (10.0, 12.5), t < 5.0, rise)
-    assert summary.mean < 1.97
-    assert summary.mean_std == pytest.approx(2.0 - summary.mean, rel=0.15)
+def test_an_impulse_holds_what_the_smoother_spreads_out_of_the_window():
+    """Half a wave as long as the smoother's rise: smoothed, a fourth of its impulse lies outside the window."""
+    push = 8.0 * np.where((T >= 20.0) & (T <= 20.2), np.sin(np.pi * (T - 20.0) / 0.2), 0.0)
+    direct = push + noise(std=0.05)
+    found = summarise(T, (smoothed(push, 0.2), 0.0 * T, direct), (20.0, 20.2), T < 15.0, rise=0.2)
+    assert found.impulse == pytest.approx(8.0 * 0.2 * 2 / np.pi, abs=3 * found.impulse_std)
+    assert found.impulse_std < 0.01
+
+
+def test_few_free_windows_widen_the_error_of_a_mean_as_student_says():
+    few, many = (summarise(T, (noise(),) * 3, (30.0, 33.0), end > T, rise=0.0) for end in (6.0, 29.0))
+    size = [mean_size(noise(), end > T, 301) for end in (6.0, 29.0)]
+    assert few.mean_std / size[0] == pytest.approx(12.706 / 1.96, rel=1e-3)  # one window, and no whole second one
+    assert many.mean_std / size[1] == pytest.approx(2.262 / 1.96, rel=1e-3)  # nine
 
 
 def test_noise_is_told_from_the_error_of_a_model():
@@ -561,7 +572,8 @@ def test_the_error_of_an_onset_is_noise_over_slope_the_shape_of_the_rise_and_noi
 
 def test_what_no_mean_reduces_is_in_the_error_of_a_mean_as_it_is():
     plain, more = (
-        summarise(T, (noise(), np.zeros(len(T))), (10.0, 12.0), T < 5.0, 0.0, constant) for constant in (None, T / 22)
+        summarise(T, (noise(), np.zeros(len(T)), noise()), (10.0, 12.0), T < 5.0, 0.0, constant)
+        for constant in (None, T / 22)
     )
     assert more.mean_std == pytest.approx(np.hypot(plain.mean_std, 0.5), rel=1e-9)
     assert more.impulse_std == pytest.approx(2.0 * more.mean_std, rel=1e-9)

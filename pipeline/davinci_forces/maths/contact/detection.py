@@ -19,8 +19,9 @@ A window of contact is summarised by peak, mean and impulse of the external effo
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
 The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off is added.
-It is taken as the peak minus the mean over `TIP_REACH` on either side.  What the smoother spreads out of the window, up
-to that far, is added to the standard error of the mean.
+It is taken as the peak minus the mean over `TIP_REACH` on either side.  Mean and impulse are those of the measured
+minus the modelled effort, because a smoother spreads a part of a push out of its window.  Student's t widens their
+errors if free motion holds few windows.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,6 +33,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.windows import runs
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
@@ -164,18 +166,19 @@ class Summary(NamedTuple):
 
 def summarise(
     t: Array,
-    effort: tuple[Array, Array],
+    effort: tuple[Array, Array, Array],
     window: tuple[float, float],
     free: Booleans,
     rise: float,
     constant_std: Array | None = None,
 ) -> Summary | None:
-    """Peak, mean and impulse of an external effort (N,) with its deviation (N,) in a window [s]; None if that is empty.
+    """Peak, mean and impulse of an external effort in a window [s]; None if that is empty.
 
+    `effort` is the smoothed one (N,), its deviation (N,), and measured minus modelled effort (N,).
     `free` (N,) are the samples at which nothing touches the robot.  `rise` [s] is the duration T_s of a step.
     `constant_std` (N,) is the part of the deviation that no mean reduces and that free motion does not show.
     """
-    (tau_ext, std), (start, end) = effort, window
+    (tau_ext, std, direct), (start, end) = effort, window
     within = (t >= start) & (t <= end)
     inside = tau_ext[within]
     if not len(inside):
@@ -183,11 +186,10 @@ def summarise(
     duration, edges = end - start, np.concatenate([[start], 0.5 * (t[within][1:] + t[within][:-1]), [end]])
     # Each sample counts for the time around it, within window and log.
     shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
-    mean = float(np.average(inside, weights=shares))
+    mean = float(np.average(direct[within], weights=shares))
     constant = 0.0 if constant_std is None else float(constant_std[within].mean())
-    beside = ~within & (t >= start - TIP_REACH * rise) & (t <= end + TIP_REACH * rise)
-    spread_out = float(tau_ext[beside].sum() / len(inside))
-    mean_std = float(np.linalg.norm([mean_size(tau_ext, free, len(inside)), constant, spread_out]))
+    widening = students_95(max(int(free.sum()) // len(inside), 1)) / NORMAL_95
+    mean_std = float(np.hypot(widening * mean_size(direct, free, len(inside)), constant))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
     noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))

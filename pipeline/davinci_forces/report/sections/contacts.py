@@ -25,12 +25,12 @@ def section(context: Context) -> Iterator[Block]:
             "found there. The window of a contact is stated in study.toml. Otherwise it is the time in which the "
             "smoothed external effort exceeds the alarm level, which free motion crosses at most once in ten "
             "minutes, if the interval of the peak, without its flattening, does not hold zero. Onset and release are "
-            "the times at which the effort leaves zero and returns to it. Peak (the largest external effort), mean "
-            "and impulse (effort times time) are taken over the whole window. Their standard errors are their spread "
-            "over windows of the same length in free space. The standard error of a peak also includes the "
-            "smoother's standard deviation there, and the height by which smoothing flattens the peak. The standard "
-            "error of a mean also includes the effort that smoothing moves out of the window. Peaks are judged by "
-            "the detection level, which is lower: 99 % of the samples of the joint's worst run in free space "
+            "the times at which the effort leaves zero and returns to it. The peak is the largest external effort in "
+            "the window. Mean and impulse (mean times time) are those of measured minus modelled effort, which no "
+            "smoothing moves out of the window. Their standard errors are their spread over windows of the same "
+            "length in free space. The standard error of a peak also includes the smoother's standard deviation "
+            "there, and the height by which smoothing flattens the peak. Peaks are judged by the detection level, "
+            "which is lower than the alarm level: 99 % of the samples of the joint's worst run in free space "
             f"stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)

@@ -97,9 +97,10 @@ def contacts(
         return
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
+    effort = (*steady_effort(track), track.tau_ext_direct)
     rows, above, short = [], [], []
     for window, event, stated in placed:
-        summary = summarise(track.t, steady_effort(track), window, free, track.smooth_rise, friction_std)
+        summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
         if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.noise_std:
             event = None
         if summary is not None and (event or (stated and not track.at_rest)):
