@@ -384,6 +384,17 @@ def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_sp
         guide.page(topic)
 
 
+def test_a_term_of_two_words_needs_no_quotes():
+    shown = CliRunner().invoke(app, ["guide", "detection", "level"])
+    assert (shown.exit_code, "detection level: " in shown.output) == (0, True)
+
+
+def test_a_page_links_every_notebook():
+    texts = [page.text for page in guide.pages()]
+    for notebook in GUIDE.glob("*.ipynb"):
+        assert any(f"{notebook.name})" in text for text in texts), notebook.name
+
+
 def test_pages_that_are_made_have_every_field_name_and_robot_once():
     pages = {page.topic: page.text for page in guide.pages()}
     headings = re.findall(r"^## (.*)$", pages["fields"], re.M)

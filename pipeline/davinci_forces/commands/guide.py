@@ -11,7 +11,9 @@ DEFAULT_FILE = Path("davinci-forces-guide.html")
 
 
 def run(
-    topic: Annotated[str | None, typer.Argument(help="Topic or term to show; without one, the list of topics.")] = None,
+    topic: Annotated[
+        list[str] | None, typer.Argument(help="Topic or term to show; without one, the list of topics.")
+    ] = None,
     html: Annotated[
         bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")
     ] = False,
@@ -22,7 +24,7 @@ def run(
     from davinci_forces.errors import BadRequest
     from davinci_forces.files import write_bytes
 
-    page = guide.page(topic) if topic else None
+    page = guide.page(" ".join(topic)) if topic else None
     if not html:
         if out:
             raise BadRequest("--out names the file that --html writes; add --html")
