@@ -70,6 +70,8 @@ def test_no_noise_is_taken_for_rounding_and_blocks_change_nothing(monkeypatch):
     _, effort, std, rounding, spread = smoothed("half-sine", 1.0, 1.0, 0)
     assert (rounding[(T > 2.0) & (T < 8.0)] == 0.0).mean() > 0.6
     assert rounding_error(effort[:1], std[:1] ** 2, T_S, spread) == [0.0]
+    assert not rounding_error(effort, std**2, T_S, np.nan).any()
+    assert np.isfinite(rounding_error(effort, std**2, T_S, 1e9)).all()
     monkeypatch.setattr("davinci_forces.maths.arrays.BLOCK_SAMPLES", 150)
     np.testing.assert_allclose(rounding_error(effort, std**2, T_S, spread), rounding, atol=1e-12)
 

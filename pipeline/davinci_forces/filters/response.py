@@ -145,8 +145,11 @@ def rounding_error(tau_ext: Array, variance: Array, T_s: float, rise: float) -> 
     A smoother that spreads a step over the time `rise` [s] is off by half of what it would change in that time.  At a
     peak it is off by its distance from its mean within `TIP_REACH`.  Of that, one standard deviation is due to noise.
     """
-    error, reach = np.zeros(len(tau_ext)), round(TIP_REACH * rise / T_s)
-    for rows in row_blocks(len(tau_ext)) if len(tau_ext) > 1 else ():
+    error = np.zeros(len(tau_ext))
+    if len(tau_ext) < 2 or not np.isfinite(rise):  # as where an effort is lost in the rounding of its sums
+        return error
+    reach = round(min(TIP_REACH * rise / T_s, len(tau_ext)))
+    for rows in row_blocks(len(tau_ext)):
         first = max(rows.start - reach - 1, 0)
         near = tau_ext[first : rows.stop + reach + 1]
         total = np.cumsum(np.pad(near, (reach + 1, reach), "edge"))
