@@ -191,10 +191,19 @@ def summarise(
     widening = students_95(max(int(free.sum()) // len(inside), 1)) / NORMAL_95
     mean_std = float(np.hypot(widening * mean_size(direct, free, len(inside)), constant))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
-    rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
     noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))
-    peak_std = float(np.hypot(noise_std, rounded_off))
+    peak_std = float(np.hypot(noise_std, rounded_off(t, tau_ext, k, rise)))
     return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration, noise_std)
+
+
+def rounded_off(t: Array, tau_ext: Array, k: int, rise: float) -> float:
+    """What a smoother that spreads a step over `rise` [s] takes off the peak at sample k of an effort (N,)."""
+    return float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
+
+
+def without_rounding(std: Array, rounding: Array) -> Array:
+    """The standard deviation (N,) of a smoothed effort without its part (N,) from what the smoother rounds off."""
+    return np.asarray(np.sqrt(np.maximum(std**2 - rounding**2, 0.0)))
 
 
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:

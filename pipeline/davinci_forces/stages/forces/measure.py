@@ -5,7 +5,14 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import TIP_REACH, Event, events, summarise, typical_alarm_level
+from davinci_forces.maths.contact.detection import (
+    TIP_REACH,
+    Event,
+    events,
+    summarise,
+    typical_alarm_level,
+    without_rounding,
+)
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
@@ -124,7 +131,7 @@ def contacts(
 
 def steady_effort(track: Track) -> tuple[Array, Array]:
     """The smoothed effort (N,) and its deviation (N,) without what is rounded off, which is added to that of a peak."""
-    return track.tau_ext_smooth, np.sqrt(track.tau_ext_smooth_std**2 - track.tau_ext_rounding**2)
+    return track.tau_ext_smooth, without_rounding(track.tau_ext_smooth_std, track.tau_ext_rounding)
 
 
 def hidden_peak(track: Track, onset: float) -> str:

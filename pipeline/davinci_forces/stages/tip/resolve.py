@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.contact.detection import TIP_REACH
+from davinci_forces.maths.contact.detection import rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -214,22 +214,15 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def rounded_off(track: Track, at: Integers) -> Array:
-    """What the smoother rounds off an effort at samples (K,), as off the peak of a contact (K,)."""
-    x, reach = track.tau_ext_smooth, TIP_REACH * track.smooth_rise
-    return np.array([x[k] - x[np.abs(track.t - track.t[k]) <= reach].mean() for k in at])
-
-
 def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers) -> tuple[Array, Array]:
     """Covariance (K, 3, 3) of the force at peaks (K,) with what is rounded off, and errors (K, 3) of its half-axes.
 
     They err by each joint's model variance, and what is rounded off is as uncertain as the rest of the force.
     """
     J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
-    total = np.stack([track.tau_ext_smooth_std[at] for track in tracks], axis=-1)
-    std = np.sqrt(total**2 - np.stack([track.tau_ext_rounding[at] for track in tracks], axis=-1) ** 2)
+    std = np.stack([without_rounding(t.tau_ext_smooth_std[at], t.tau_ext_rounding[at]) for t in tracks], axis=-1)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
-    rounded = np.column_stack([rounded_off(track, at) for track in tracks])
+    rounded = np.array([[rounded_off(t.t, t.tau_ext_smooth, k, t.smooth_rise) for t in tracks] for k in at.tolist()])
     lost, C = tip_force.from_efforts(J, rounded, tip_force.covariance(std, rho))
     squares, half_axes = np.zeros(std.shape), tip_force.sigma_ellipsoid(C)[0]
     for i, track in enumerate(tracks):

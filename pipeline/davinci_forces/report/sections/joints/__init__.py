@@ -220,8 +220,8 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     )
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
-    said = context.catalogue.select(Diagnostic, stage="fit", subject=group)
-    remarks = tuple(literal(text.replace("`", "")) for diagnostic in said for text in diagnostic.text)
+    diagnostics = context.catalogue.select(Diagnostic, stage="fit", subject=group)
+    remarks = tuple(literal(text.replace("`", "")) for diagnostic in diagnostics for text in diagnostic.text)
     first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
     more = (
         *([Bullets(remarks)] if remarks else []),
