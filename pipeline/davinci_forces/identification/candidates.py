@@ -217,7 +217,10 @@ def ridge_name(strength: float) -> str:
 
 def library(model: CoupledArm | IndependentJoint, logs: Sequence[Observed], count: int) -> Library:
     """Return a model with its equations."""
-    poses = np.concatenate([log.motions[0].q[:: max(1, len(log.block) // POSES)] for log in logs])
+    steps = [max(1, len(log.block) // POSES) for log in logs]
+    poses = np.concatenate([
+        np.column_stack([record.q[::step] for record in log.records]) for log, step in zip(logs, steps, strict=True)
+    ])  # fmt: skip
     return Library(model, tuple(logs), equations(model, logs, count), model.inertia_columns(poses))
 
 
@@ -259,7 +262,8 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
-        q, dq = (x[:, i][is_evaluated(log.records[i])] for x in (log.motions[i].q, log.motions[i].dq))
+        record = log.records[i]
+        q, dq = (x[is_evaluated(record)] for x in (record.q, record.dq))
         low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
         squares += float(dq @ dq)
