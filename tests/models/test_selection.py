@@ -64,7 +64,7 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     p = len(model.parameters)
     Phi = RNG.normal(size=(N, 1, p))
     cells = sum_equations(Phi, Phi @ np.ones(p), CELL, CELLS)
-    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells), np.empty(0))
+    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells))
     made = RefitModel(CandidatePart(model, library, list(range(p)), PLAIN), 1)
     solved = []
     monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
