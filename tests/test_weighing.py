@@ -1,6 +1,7 @@
 """Masses from external efforts: the regression, the path that a tare shares, and the stages on a simulated arm."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -182,6 +183,7 @@ def weighed(logs, weighing, robot=ROBOT, channels=()):
     return made, [text for d in (*said, *made) if isinstance(d, Diagnostic) for text in d.text]
 
 
+@cache
 def study(seed, tare="", position=HUNG.position, tare_path=0.0):
     """A fit's log, a free log on another path, a weight log, and a run without the mass."""
     logs = [
@@ -396,7 +398,7 @@ def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
 
 def test_a_model_without_any_error_tells_the_mass_exactly(monkeypatch):
     monkeypatch.setattr("tests.test_weighing.left_by_the_model", lambda t, seed: np.zeros((len(t), 3)))
-    weight, free, _ = study(0)
+    weight, free, _ = study.__wrapped__(0)
     # Central differences err by (w T_s)^2 / 6, 2e-4 of what the fastest acceleration asks for.
     assert weight.mass == pytest.approx(MASS, rel=2e-4)
     assert max(abs(f.free_mass) for f in free.values()) < 1e-12
@@ -408,6 +410,7 @@ CONSTANTS, GEAR = {"hand_roll": 0.0438, "hand_pitch": 0.05, "instrument_slide": 
 CURRENTS = tuple(Source(f"{joint}.i", joint, "current") for joint in JOINTS)
 
 
+@cache
 def by_current(seed=0, stated=0.04, tare="", channels=CURRENTS, mass=MASS):
     """The constants of a weight log whose currents were measured, by joint, and the diagnostics.
 
@@ -475,7 +478,7 @@ def test_without_currents_or_a_known_mass_no_constant_is_proposed(change):
 
 def test_a_constant_that_the_mass_hardly_shows_is_not_proposed(monkeypatch):
     monkeypatch.setattr(weigh, "MAX_RELATIVE_ERROR", 0.06)
-    precise = {joint: c.torque_constant_std / c.torque_constant for joint, c in by_current(0)[0].items()}
+    precise = {joint: c.torque_constant_std / c.torque_constant for joint, c in by_current.__wrapped__(0)[0].items()}
     assert set(precise) == {"hand_roll"}
     assert precise["hand_roll"] <= 0.06
 

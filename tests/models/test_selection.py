@@ -64,7 +64,7 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     p = len(model.parameters)
     Phi = RNG.normal(size=(N, 1, p))
     cells = sum_equations(Phi, Phi @ np.ones(p), CELL, CELLS)
-    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells), np.empty(0))
+    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells))
     made = RefitModel(CandidatePart(model, library, list(range(p)), PLAIN), 1)
     solved = []
     monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
@@ -75,7 +75,7 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
 
 @pytest.mark.parametrize(("period", "refit"), [([0, 0, 0, -1], [0, 0, 0, -1]), ([-1] * 4, [0] * 4)])
 def test_a_log_that_is_left_out_is_predicted_in_its_periods_or_whole_if_it_has_none(period, refit):
-    log = Observed((), (), (), np.empty((4, 0)), np.zeros(4, int), np.array(period), 17.0, 0, {})
+    log = Observed((), (), np.empty((4, 0)), np.zeros(4, int), np.array(period), 17.0, 0, {})
     two = SimpleNamespace(logs={0: log, 1: log}, total=2, by_block=None)
     scheme = unseen.scheme_of_own_fits(two, log)
     assert scheme.refit.tolist() == refit

@@ -88,7 +88,7 @@ def test_the_gradient_of_the_search_is_that_of_differences(six, criterion):
 @pytest.mark.slow
 def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random(six):
     """The criterion of 300 random trajectories of size 1 within the same limits: at least 8 above the design's."""
-    problem, random = problem_of(six), np.random.default_rng(0)
+    problem, random = problem_of(six, samples=60), np.random.default_rng(0)
     design = design_together(problem, 1, 0)
     assert_limits_hold(six, problem, design.series, WORKSPACE)
     best = np.inf
@@ -104,7 +104,7 @@ def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random
 
 @pytest.mark.slow
 def test_five_starts_of_the_da_vinci_agree():
-    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles(), samples=300)
+    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles(), samples=150)
     assert np.ptp(design_together(problem, 5, 0).optima) <= 0.02
 
 

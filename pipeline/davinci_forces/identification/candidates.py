@@ -6,6 +6,8 @@ A library is a model with every friction that may be added.  A candidate is a ch
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -35,13 +37,22 @@ WEIGHTS_RIDGE = 1e-3  # of the fits whose residual variances weigh the joints
 POSES = 50  # number of poses of each log at which the inertia has to be positive definite
 
 
-class Library(NamedTuple):
+@dataclass(frozen=True)
+class Library:
     """A model with all candidate friction, and the equations of its efforts."""
 
     model: CoupledArm | IndependentJoint
     logs: tuple[Observed, ...]
     cells: CellEquations
-    inertias: Array  # (S, m, m, p) with M = inertias theta, along the trajectories
+
+    @cached_property
+    def inertias(self) -> Array:
+        """The columns (S, m, m, p) of M = inertias theta at some poses along the trajectories."""
+        steps = [max(1, len(log.block) // POSES) for log in self.logs]
+        poses = [
+            np.stack([r.q[::step] for r in log.records], axis=1) for log, step in zip(self.logs, steps, strict=True)
+        ]
+        return self.model.inertia_columns(np.concatenate(poses))
 
     @property
     def combination(self) -> Array:
@@ -217,11 +228,7 @@ def ridge_name(strength: float) -> str:
 
 def library(model: CoupledArm | IndependentJoint, logs: Sequence[Observed], count: int) -> Library:
     """Return a model with its equations."""
-    steps = [max(1, len(log.block) // POSES) for log in logs]
-    poses = np.concatenate([
-        np.column_stack([record.q[::step] for record in log.records]) for log, step in zip(logs, steps, strict=True)
-    ])  # fmt: skip
-    return Library(model, tuple(logs), equations(model, logs, count), model.inertia_columns(poses))
+    return Library(model, tuple(logs), equations(model, logs, count))
 
 
 def every_term(reach: Reach) -> tuple[Term, ...]:

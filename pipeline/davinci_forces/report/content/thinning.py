@@ -1,7 +1,6 @@
 """Thinning marks of many samples, without hiding an extreme."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,15 +38,13 @@ def envelope(x: Array, y: Array, bins: int) -> Indices:
     An extreme is never lost, however short; a range without a finite sample keeps one, so that a gap stays a gap.
     x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
     """
-    indices = []
-    for start, stop in pairwise([*_range_starts(x, bins).tolist(), len(x)]):
-        part = y[start:stop]
-        unknown = np.isnan(part)
-        indices += [
-            start + np.argmin(np.where(unknown, np.inf, part)),
-            start + np.argmax(np.where(unknown, -np.inf, part)),
-        ]
-    return np.unique(indices)
+    starts = _range_starts(x, bins)
+    number = np.repeat(np.arange(len(starts), dtype=np.int32), np.diff(starts, append=len(x)))
+    indices = [starts[np.isnan(np.fmin.reduceat(y, starts))]]
+    for extreme in (np.fmin, np.fmax):
+        at = np.flatnonzero(y == extreme.reduceat(y, starts)[number])
+        indices.append(at[np.diff(number[at], prepend=-1) > 0])
+    return np.unique(np.concatenate(indices))
 
 
 def _range_starts(x: Array, bins: int) -> Indices:
