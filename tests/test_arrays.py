@@ -3,6 +3,7 @@
 import doctest
 import gc
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from davinci_forces.arrays import IdentifiedArm
 from davinci_forces.errors import BadRequest, BadRobot
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, JointModel, Record, Track, store
+from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.runner import runs
 from tests import arm
 
@@ -132,6 +134,17 @@ def test_nothing_is_printed_and_the_folder_is_removed_with_the_object(capfd):
     del fitted
     gc.collect()
     assert not home.exists()
+
+
+def test_what_a_study_s_run_warns_of_is_a_warning_of_python():
+    """Degrees of a joint that states no limits."""
+    joint = replace(arm.ARM.joint(JOINT), limits=UNLIMITED)
+    with pytest.warns(
+        UserWarning, match=r"identification/hand_roll: positions reach .* the limit of 6\.28 rad, which is assumed"
+    ):
+        davinci_forces.identify(
+            replace(arm.ARM, joints=(joint,)), FIRST.t, np.rad2deg(FIRST.q), FIRST.tau, joints=JOINT
+        )
 
 
 def test_notebooks_show_parameters_efforts_and_contacts(identified):

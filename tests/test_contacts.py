@@ -480,6 +480,23 @@ def test_a_push_is_found_in_a_stated_window_that_it_fills_or_leaves():
         assert contact.found[0] == found
 
 
+def test_the_error_of_an_impulse_includes_those_of_onset_and_release_unless_its_window_is_stated():
+    """Flanks of half a cosine: where the smoother starts the contact late, part of the impulse lies before it."""
+    flank = np.clip(np.minimum((T - 10.0) / 0.15, (10.5 - T) / 0.15), 0.0, 1.0)
+    push = 3.0 * (0.5 - 0.5 * np.cos(np.pi * flank))
+    quiet = [Threshold("hand_roll", "rts", 0.01, 0.001, 0.02, 0.002, "c", 1, 0.95, 0.01, 0.2)]
+    shown = replace(track(smoothed(push, 0.1), std=0.002, smooth_rise=0.1), tau_ext_direct=push + noise(std=0.005))
+    found, stated = (
+        next(r for r in measured(shown, quiet, entry(role="contact", contact=w)) if isinstance(r, Contact))
+        for w in ((), ((9.9, 10.6),))
+    )
+    edges = np.interp([found.onset[0], found.release[0]], T, shown.tau_ext_smooth)
+    expected = np.hypot(edges[0] * found.onset_std[0], edges[1] * found.release_std[0])
+    assert found.impulse_std[0] == pytest.approx(expected, rel=0.1)
+    assert found.impulse[0] == pytest.approx(3.0 * 0.35, abs=3 * found.impulse_std[0])
+    assert stated.impulse_std[0] < 0.1 * found.impulse_std[0]
+
+
 def test_a_log_that_identifies_holds_contacts_only_where_its_effort_is_far_from_the_rest():
     effort = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
     quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.11, 0.01, "c", 1, 0.95, 0.01, 0.2)]

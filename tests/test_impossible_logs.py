@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 import davinci_forces
 from davinci_forces.errors import BadLog
 from davinci_forces.records import Diagnostic, Recording
+from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.stages.recordings import resample
 from tests import arm
 from tests.guide.make_logs import JOINT, LINK, measured, motion, sensed
@@ -301,6 +303,17 @@ def test_motion_beyond_the_limits_of_a_joint_is_remarked_on_and_far_beyond_them_
         'are they in degrees or counts? write the unit of the channel in study.toml, as unit = "deg", or the gear_ratio'
         in str(refused.value)
     )
+
+
+def test_degrees_are_remarked_on_where_a_joint_states_no_limits_and_never_refused(monkeypatch):
+    joint = arm.ARM.joint("hand_roll")
+    boundless = replace(
+        arm.ARM, joints=tuple(replace(j, limits=UNLIMITED) if j is joint else j for j in arm.ARM.joints)
+    )
+    monkeypatch.setattr(arm, "ARM", boundless)
+    assert resampled(scaled(q=1.0), velocity="derived") == []
+    (text,) = resampled(scaled(q=DEG), velocity="derived")
+    assert re.search(r"positions reach .* rad, .* times the limit of 6\.28 rad, which is assumed.*convert arrays", text)
 
 
 def test_an_effort_that_never_changes_is_named_with_its_value():

@@ -82,13 +82,17 @@ def test_intervals_of_95_percent_hold_the_truth_in_90_to_98_percent_of_20_seeds(
 def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in_the_other_model(
     monkeypatch, variance, explained
 ):
-    """Of nested models, noise adds the difference of the variances (Hausman, 1978); a parameter may be lacking."""
-    masses, springs = np.eye(2)
-    here = SimpleNamespace(sums={"mass": masses, "spring": springs}, C=np.eye(2), by_block=None, ridge=None)
-    there = SimpleNamespace(sums={"mass": np.ones(1)}, C=variance * np.eye(1), by_block=None, ridge=None)
+    """Of nested models, noise adds the difference of the variances (Hausman, 1978).
+
+    A parameter may be lacking: a slope is then 0, and of a spring nothing is known.
+    """
+    mass, *lacking = (("mass", 1.0), ("spring of roll", 1.0), ("stiffness, slope of roll", 1.0))
+    sums = dict(zip((mass, *lacking), np.eye(3), strict=True))
+    here = SimpleNamespace(sums=sums, C=np.eye(3), by_block=None, ridge=None)
+    there = SimpleNamespace(sums={mass: np.ones(1)}, C=variance * np.eye(1), by_block=None, ridge=None)
     monkeypatch.setattr(model_error, "sums_to_compare", lambda part: part.sums)
     monkeypatch.setattr(model_error, "unit_variance", lambda part: part.C)
     monkeypatch.setattr(model_error, "sum_all", lambda cells: cells)
     monkeypatch.setattr(model_error, "solve", lambda cells, ridge: np.array([2.5]))
-    changes = model_error.squared_changes(here, np.array([2.0, 7.0]), np.array([0.1, 0.1]), there)
-    np.testing.assert_allclose(changes, [0.25 - explained, np.nan])
+    changes = model_error.squared_changes(here, np.array([2.0, 7.0, 3.0]), np.full(3, 0.1), there)
+    np.testing.assert_allclose(changes, [0.25 - explained, np.nan, 9.0])

@@ -20,6 +20,7 @@ from davinci_forces.cli import app
 from davinci_forces.errors import BadRequest
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.logs import FORMATS
+from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.maths.units import SI, UNITS
 from davinci_forces.records import (
     COLUMN_DTYPES,
@@ -105,6 +106,10 @@ def test_settings_are_those_that_there_are_with_their_defaults():
     defaults = {spans(name)[0]: tomllib.loads(f"x = {default}")["x"] for name, default, *_ in table}
     assert list(defaults.items()) == list(asdict(Settings()).items())
     assert [type(value) for value in defaults.values()] == [type(value) for value in asdict(Settings()).values()]
+
+
+def test_the_page_of_a_robot_s_file_names_every_term_of_a_joint():
+    assert [name for name in TERMS if f"`{name}`" not in PAGES["robot-file"].replace("\n", " ")] == []
 
 
 def test_the_robot_that_is_shown_is_one(tmp_path):

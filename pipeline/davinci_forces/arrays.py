@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -270,6 +271,8 @@ class IdentifiedArm:
         runner = Runner(study, self._places, Console(lambda line, **style: None, lines.append))
         if not runner.run([stage]):
             raise BadRequest("\n".join(lines))
+        for line in lines if stage != PREDICTED else ():  # a prediction is given no effort, which is no fault
+            warnings.warn(line, stacklevel=4)
 
         def read(kind: type[AnyRecord]) -> list[AnyRecord]:
             places = runner.plan.places().find((kind,))

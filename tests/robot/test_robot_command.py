@@ -82,6 +82,18 @@ def test_a_singular_pose_has_no_condition_number_and_says_why(pose):
     assert "condition of J_v   singular" in asked("davinci", "--at", pose).stdout
 
 
+def test_an_arm_of_two_joints_has_no_condition_of_a_force_at_the_tip_and_no_warning_of_one(tmp_path):
+    """Two joints never determine such a force, whatever the pose."""
+    joint = '[[joint]]\nname = "{}"\nkind = "revolute"\nterms = ["inertia"]\n'
+    links = (
+        '[[link]]\nname = "upper"\nalpha = 1.5708\nmoved_by = "a"\n[[link]]\nname = "fore"\na = 0.3\nmoved_by = "b"\n'
+    )
+    file = tmp_path / "planar.toml"
+    file.write_text('convention = "modified"\n' + joint.format("a") + joint.format("b") + links)
+    assert (document(str(file))["condition"], document(str(file))["warnings"]) == (None, [])
+    assert "singular" not in asked(str(file)).stdout
+
+
 def test_the_text_shows_every_matrix_and_no_rounding_errors():
     text = asked("davinci").stdout
     for title in ("frame   origin [m]", "tip [m]", "J_v of the tip", "J_omega", "\nM\n", "C dq", "G   ", "condition"):

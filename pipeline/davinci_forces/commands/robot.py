@@ -114,7 +114,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
     T = kinematics.frames(chain, pose)
     J_v, J_w = kinematics.jacobian(chain, pose)
-    singular = bool(tip_force.is_singular(chain, pose))
+    singular = chain.n >= tip_force.ARM and bool(tip_force.is_singular(chain, pose))
     return {
         "frames": {
             name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
@@ -125,7 +125,9 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "jacobian_v": J_v.tolist(),
         "jacobian_w": J_w.tolist(),
         **_dynamics(robot, pose, rates),
-        "condition": None if singular else float(tip_force.condition(J_v[..., : tip_force.ARM])),
+        "condition": None
+        if singular or chain.n < tip_force.ARM
+        else float(tip_force.condition(J_v[..., : tip_force.ARM])),
         "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
         "joints": _joints(robot),
     }
@@ -205,6 +207,8 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
             lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
     if document["mass"] is not None:
         lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
+    if len(document["jacobian_v"][0]) < 3:  # no force at the tip, so no condition
+        return "\n".join(lines)
     condition = document["condition"]
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
 

@@ -38,6 +38,7 @@ from davinci_forces.maths.selection import (
 from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 SLIDING = ("presliding friction", "smooth friction")  # at speed equal to Coulomb friction
+WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
 
@@ -53,11 +54,15 @@ def model_std(part: CandidatePart, theta: Array, noise_std: Array, candidates: I
 
 
 def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: CandidatePart) -> Array:
-    """Square the changes of parameters (p,) in another model, less what noise explains; NaN if it lacks a parameter."""
+    """Square the changes of parameters (p,) in another model, less what noise explains.
+
+    A slope or curvature that the model lacks is 0 there.  Of any other parameter that it lacks, the change is NaN.
+    """
     theirs, theta_of_model = sums_to_compare(model), solve(sum_all(model.by_block), model.ridge)
     C, C_of_model, squares = unit_variance(part), unit_variance(model), np.full(len(theta), np.nan)
     for i, (name, a) in enumerate(sums_to_compare(part).items()):
-        if (b := theirs.get(name)) is not None:
+        lacking = np.zeros(len(theta_of_model)) if name[0].partition(" of ")[0].endswith(WITHOUT_TERM_0) else None
+        if (b := theirs.get(name, lacking)) is not None:
             by_noise = noise_std[i] ** 2 * max(b @ C_of_model @ b / (a @ C @ a) - 1.0, 0.0)
             squares[i] = (b @ theta_of_model - a @ theta) ** 2 - by_noise
     return squares

@@ -113,7 +113,9 @@ def contacts(
         if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
-            rows.append((int(stated), int(event is not None), *times, *duration, *summary[:-1]))
+            edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
+            impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
+            rows.append((int(stated), int(event is not None), *times, *duration, *summary[:4], *impulse))
             above.append(is_above[~is_outside(track.t, [window])].any())
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))

@@ -33,7 +33,8 @@ VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with the
 MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_VELOCITY_RATIO = 5.0  # beyond it or below its inverse, the log contradicts itself, and is refused
 MAX_BEYOND_LIMITS, IMPOSSIBLE = 2.0, 20.0  # as multiples of a joint's limits; a warning, and a refusal
-MIN_JUMP, MAX_USUAL = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
+USUAL_LIMITS = (2.0 * np.pi, 20.0)  # [rad or m, rad/s or m/s] limits of a joint that states none, only to warn
+MIN_JUMP, MAX_USUAL_LIMITS = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
 UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the position; mm only of joints that slide
     (180.0 / np.pi, 'is the velocity in deg/s? write unit = "deg/s" for its channel'),
     (np.pi / 180.0, 'is the position in degrees? write unit = "deg" for its channel'),
@@ -176,18 +177,21 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
     """
     beyond, largest = [], 0.0
     names = ("positions", "{position}"), ("velocities", "{position}/s")
-    for (what, unit), x, limits in zip(names, smooth, (joint.limits.q, joint.limits.dq), strict=False):
+    for (what, unit), x, limits, usual in zip(
+        names, smooth, (joint.limits.q, joint.limits.dq), USUAL_LIMITS, strict=False
+    ):
         reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, limits))
+        assumed, limit = (", which is assumed as none is stated", usual) if np.isinf(limit) else ("", limit)
         if reach > MAX_BEYOND_LIMITS * limit:
             times = f"{reach / limit:.3g} times the limit of {limit:.3g}"
-            beyond.append(joint.unit(f"{what} reach {reach:.3g} {unit}, {times} {unit}"))
-            largest = max(largest, reach / limit)
+            beyond.append(joint.unit(f"{what} reach {reach:.3g} {unit}, {times} {unit}{assumed}"))
+            largest = max(largest, 0.0 if assumed else reach / limit)
     if beyond:
         units = "degrees" if joint.kind is Kind.REVOLUTE else "mm"
         fault = (
             f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts? write the "
             f'unit of the channel in study.toml, as unit = "{units[:3]}", or the gear_ratio of a motor, or correct the '
-            "limits of the robot"
+            "limits of the robot; convert arrays that belong to no study"
         )
         if largest > IMPOSSIBLE:
             raise BadLog(fault)
@@ -203,7 +207,7 @@ def faults(recording: Recording) -> Iterator[str]:
             f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
     step = np.diff(q)
-    jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL * np.quantile(np.abs(step), 0.99)))
+    jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL_LIMITS * np.quantile(np.abs(step), 0.99)))
     if len(jumps):
         yield (
             f"{name}: the position jumps by {step[jumps[0]]:.3g} within one sample at {recording.t[jumps[0]]:.3f} s"
