@@ -14,13 +14,12 @@ import numpy as np
 
 from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
 from davinci_forces.filters.sample import Belief
-from davinci_forces.filters.stepping import arguments, correct, covariances, predict, transition
+from davinci_forces.filters.stepping import STORED, arguments, correct, covariances, predict, run, transition
 from davinci_forces.maths.compiled import compile_and_store
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.signals.windows import TRANSIENT
 
 NAME = "Extended Kalman filter"
-LOG_2_PI = float(np.log(2.0 * np.pi))
 
 
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
@@ -29,7 +28,7 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     for rows, part in input_blocks(recording):
         out = np.empty((7, part.samples))
         before, *others = arguments(part, noise)
-        s = _pass(s or before, *others, *out)
+        s, _ = run(out, np.empty((0, STORED)), part.samples, s or before, *others)
         yield rows, Tracked(*out)
 
 
@@ -42,7 +41,7 @@ def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
     The first second is omitted, because it still depends on the initial state.
     """
     transient = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
-    return float(_likelihood(transient, *arguments(recording, noise)))
+    return float(run(np.empty((7, 0)), np.empty((0, STORED)), transient, *arguments(recording, noise))[1])
 
 
 def step(
@@ -65,33 +64,3 @@ def _step(
     now, _, _, _, _ = correct(s, y_q, y_dq, R_q, R_dq)
     q, dq, F, friction_var = transition(now[0], now[1], now[2], now[6], drive, M, c_b, T_s, 0.5 * T_s * T_s)
     return now, predict(now, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
-
-
-@compile_and_store
-def _pass(
-    s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
-    Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
-    out_idq: Any, out_nis: Any,
-) -> Any:  # fmt: skip
-    for k in range(len(y_q)):
-        s, i_q, i_dq, nis, _ = correct(s, y_q[k], y_dq[k], R_q, R_dq)
-        out_q[k], out_dq[k], out_tau[k], out_std[k] = s[0], s[1], s[2], s[8] ** 0.5
-        out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
-        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
-    return s
-
-
-@compile_and_store
-def _likelihood(
-    transient: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float,
-    R_dq: float, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
-) -> float:  # fmt: skip
-    total = 0.0
-    for k in range(len(y_q)):
-        s, _, _, nis, det = correct(s, y_q[k], y_dq[k], R_q, R_dq)
-        if k >= transient:
-            total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
-        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
-        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
-    return total

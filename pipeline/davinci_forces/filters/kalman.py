@@ -9,14 +9,14 @@ take three quarters of the time.
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters.ekf import LOG_2_PI
 from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
-from davinci_forces.filters.stepping import columns, covariances, transition
+from davinci_forces.filters.stepping import LOG_2_PI, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 
@@ -120,7 +120,7 @@ def _pass(
         v_qq, v_qd, v_dd = s_dd / det, -s_qd / det, s_qq / det
         nis = i_q * (v_qq * i_q + v_qd * i_dq) + i_dq * (v_qd * i_q + v_dd * i_dq)
         if before + k >= transient:
-            total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
+            total -= 0.5 * (nis + log(det)) + LOG_2_PI
         # Joseph form, positive for any gain: P - K B' - D K' with D = B - K S
         for i in range(n):
             K[i, 0], K[i, 1] = B[i, 0] * v_qq + B[i, 1] * v_qd, B[i, 0] * v_qd + B[i, 1] * v_dd

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
-from davinci_forces.filters.stepping import arguments, correct, gains, predict, transition
+from davinci_forces.filters.stepping import STORED, arguments, gains, run
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 
 NAME = "Smoother"
 MIN_VARIANCE_SHARE = 1e-12  # a smoothed variance with a smaller share of the predicted one is rounding
-STORED = 15  # numbers stored per sample: its prediction, and the transition to the next sample
 
 
 def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
@@ -53,25 +52,9 @@ def forwards(recording: Recording, noise: NoiseModel) -> Iterator[tuple[slice, A
 
 
 def _forwards_from(before: Any, part: FilterInput, noise: NoiseModel) -> tuple[Any, Array, Array]:
-    out, stored = np.empty((3, part.samples)), np.empty((part.samples, STORED))
-    return _forwards(stored, before, *arguments(part, noise)[1:], *out), out, stored
-
-
-@compile_and_store
-def _forwards(
-    stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
-    Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
-) -> Any:  # fmt: skip
-    for k in range(len(y_q)):
-        for i in range(9):
-            stored[k, i] = s[i]
-        s, i_q, i_dq, nis, _ = correct(s, y_q[k], y_dq[k], R_q, R_dq)
-        out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
-        for i in range(6):
-            stored[k, 9 + i] = F[i]
-        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
-    return s
+    out, stored = np.empty((7, part.samples)), np.empty((part.samples, STORED))
+    after, _ = run(out, stored, part.samples, before, *arguments(part, noise)[1:])
+    return after, out[4:], stored
 
 
 @compile_and_store

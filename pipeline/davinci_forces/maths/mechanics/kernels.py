@@ -43,15 +43,17 @@ def mass_and_bias(tree: Any, gravity: float, q: Any, dq: Any, ddq: Any, M: Any, 
 
     Column c of M is the effort of a unit acceleration at rest without gravity, since one recursion compiles faster.
     """
-    n, effort = tree.n, bias.reshape(tree.n, 1)
-    joints, work = np.zeros((n + 1, 5, 1)), np.zeros((len(tree.parent) + 1, 15, 1))
+    n = tree.n
+    joints, work, effort = np.zeros((n + 1, 5, 1)), np.zeros((len(tree.parent) + 1, 15, 1)), np.zeros((1, n, 1))[0]
     for c in range(n + 1):  # the last one is the bias
         for k in range(n):
             joints[k, 0, 0], joints[k, 1, 0], joints[k, 2, 0] = cos(q[k]), sin(q[k]), q[k]
             joints[k, 3, 0], joints[k, 4, 0] = (0.0, 1.0 if k == c else 0.0) if c < n else (dq[k], ddq[k])
         recursions.inverse_dynamics(tree, gravity if c == n else 0.0, joints, work, effort, range(1))
         for k in range(c + 1 if c < n else 0):  # a distal link's effort at earlier joints has the fewest lost digits
-            M[k, c] = M[c, k] = bias[k]
+            M[k, c] = M[c, k] = effort[k, 0]
+    for k in range(n):
+        bias[k] = effort[k, 0]
 
 
 @compile_and_store

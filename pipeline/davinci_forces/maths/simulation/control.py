@@ -3,6 +3,7 @@
 The PI loops run in discrete time, for n joints.
 """
 
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def pi(error: float, p: float, i: float, integral: float, h: float, limit: float
 @compile_function
 def current_after(motors: Motors, j: int, current: float, voltage: float, speed: float, h: float) -> float:
     """The motor current after h [s] of constant voltage and motor speed [rad/s]: the exact solution of (A.5)."""
-    decay = np.exp(-h * motors.resistance[j] / motors.inductance[j])
+    decay = exp(-h * motors.resistance[j] / motors.inductance[j])
     final = (voltage - motors.torque_constant[j] * speed) / motors.resistance[j]
     return float(final + (current - final) * decay)
 

@@ -20,6 +20,7 @@ bristles does not stick: it deflects elastically before it slides (LuGre), so th
 Section 6.7; Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419-425.
 """
 
+from math import exp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,7 +52,7 @@ def level(friction: Friction, i: int, v: float) -> float:
     c = friction.coulomb_up[i] if up else friction.coulomb_down[i]
     s = friction.static_up[i] if up else friction.static_down[i]
     ratio = v / friction.stribeck_velocity[i]
-    return float(c + (s - c) * np.exp(-(ratio * ratio)))
+    return float(c + (s - c) * exp(-(ratio * ratio)))
 
 
 @compile_function
