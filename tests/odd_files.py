@@ -17,13 +17,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
+
+from davinci_forces import files
 
 SECONDS = 60  # of the clock, after which a child is ended: it waits for what never comes
 MEMORY = 4 << 30  # [bytes] of addresses that a child may have
-HUGE = {".csv": 1 << 25, ".parquet": 1 << 30}  # [bytes] of a file without content: of what is read piece by piece, else
-BEYOND = 2 << 30
+# Bytes of a file without content: of what is read piece by piece, of results, and of all else.
+HUGE, BEYOND = {".csv": 1 << 25, ".json": files.MAX_BYTES + 1}, 1 << 29
 KINDS = ("pipe", "device", "folder", "socket", "nowhere", "huge", "link")
-LOADED = ("runner.runs", "runner.verification", "runner.results.campaign", "study.template", "haptics.loop")
+LATER = ("matplotlib.figure", "pandas", "pydantic", "scipy.signal", "statsmodels.api", "typst")  # loaded when needed
+FELT = {"title": "Felt", "tissue_stiffness": 1.0, "response": [], "hands": {}}
 PAGES = {"report.html": b"<html>", "report.pdf": b"%PDF"}
 MORE = '\nhaptics = "feel.toml"\nbaseline = "old.json"\n'
 RATING = '[[rating]]\nrun = "check"\nverdict = "doubt"\nresults = "{}"\n'.format(64 * "0")
@@ -105,29 +109,32 @@ def perform(home: Path, words: list[str], said: int) -> None:
 
 def prepare(home: Path) -> None:
     """A study that all has run on, with every file beside it that a study may have."""
-    from importlib.resources import files
+    from importlib import resources
 
+    import davinci_forces
+    from davinci_forces.commands import haptics
     from davinci_forces.report import report
     from davinci_forces.robots import load
     from davinci_forces.robots.urdf import writing
-    from davinci_forces.stages import STAGES, module
     from tests import arm
 
     report.render_all = lambda documents: PAGES  # drawing takes seconds, and reads no file
+    haptics._answer = lambda scenario, csv: FELT  # so does simulating
     study = arm.write_study(home / "raw" / "arm", periods=3)
     for name in ("slide", "push"):
         (study / f"{name}.csv").unlink()
     text = (study / "study.toml").read_text()
     head, roll, _, check, _ = text.split("[[log]]")
     (study / "study.toml").write_text("[[log]]".join([head + MORE, roll, check]))
-    (study / "feel.toml").write_bytes(files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
+    (study / "feel.toml").write_bytes(resources.files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
     (study / "truth.toml").write_text("simulated = true\n")
     (study / "review.toml").write_text(RATING)
     (study / "old.json").write_text(OLD)
     (home / "arm.urdf").write_text(writing.text(load("davinci", Path())))
-    shipped = files("davinci_forces.simulation").joinpath("shipped", "davinci-joints.toml")
+    shipped = resources.files("davinci_forces.simulation").joinpath("shipped", "davinci-joints.toml")
     (home / "scene.toml").write_bytes(shipped.read_bytes())
-    for name in (*map(module, STAGES), *(f"davinci_forces.{name}" for name in LOADED)):
+    own = (module.name for module in walk_packages(davinci_forces.__path__, "davinci_forces."))
+    for name in (*LATER, *(name for name in own if not name.endswith("__main__"))):
         import_module(name)  # once, and not by every child
     made = run(home, ["all", "raw/arm"])
     assert made["code"] == 0, made["said"]

@@ -16,8 +16,8 @@ from davinci_forces import files
 from davinci_forces.errors import NotAFile
 from tests.odd_files import KINDS, Server, replace
 
-SECONDS = 15.0  # of the processor's time that a command may take; most take one
-MEMORY = 1_000_000  # [kB] that it may have
+SECONDS = 8.0  # of the processor's time that a command may take; most take one
+MEMORY = 500_000  # [kB] that it may have; most take half
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from davinci_forces.cli import app
 from davinci_forces.simulation import study_folder
 from davinci_forces.simulation.scenario.reading import load
 from tests.conftest import TWO_FRICTIONS
+from tests.contracts.conftest import shorten
 from tests.logs.bag_writer import joint_state, write
 
 LOGS = ("matched-roll-excitation", "matched-roll-validation", "matched-roll-contact", "matched-slide-excitation")
@@ -46,7 +47,8 @@ def results(folder: Path) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
+def test_bags_of_a_study_s_recordings_give_its_results(tmp_path, monkeypatch):
+    shorten(monkeypatch)  # what is designed depends on no log
     tables = simulated(tmp_path / "simulated")
     whole = study(tmp_path / "raw" / "whole", {n: re.sub(r"skip = .*\n", "", t) for n, t in tables.items()})
     original = study(tmp_path / "raw" / "original", tables)
