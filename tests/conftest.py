@@ -1,5 +1,6 @@
 """What every test may ask for, which tests take long, and how a run speaks of what it did not check."""
 
+import gc
 import os
 import signal
 import time
@@ -19,6 +20,7 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"
+gc.set_threshold(10_000)  # Python's own costs a tenth of the time: modules and tests are many objects to search
 # How long examples take is a matter of the machine and of what else it does: no test fails of it.
 slow_machine = [HealthCheck.too_slow]
 settings.register_profile("project", deadline=None, derandomize=True, suppress_health_check=slow_machine)
@@ -342,6 +344,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.slow)
         if "slow" in item.keywords and not config.getoption("--slow"):
             item.add_marker(pytest.mark.skip(reason="one of the longest studies; run with --slow"))
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector pass over what was collected of tests and modules, which stays to the end."""
+    gc.freeze()
 
 
 def _medium(item: pytest.Item) -> bool:

@@ -112,6 +112,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the console's encoding may lack characters of names in logs
             stream.reconfigure(errors="replace")
+    gc.set_threshold(5000)  # Python's own would search the many objects of the compiler 1000 times, for a second
     atexit.register(gc.freeze)  # or Python would search all objects for cycles as it ends, a tenth of a short command
     atexit.register(ignore_signals)  # a signal that arrives while Python ends would end it without a message
     for number in STOP_SIGNALS:
