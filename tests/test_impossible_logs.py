@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 
 import davinci_forces
 from davinci_forces.errors import BadLog
-from davinci_forces.identification import search
 from davinci_forces.records import Diagnostic, Recording
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.stages.recordings import resample
@@ -199,16 +198,7 @@ def arms() -> list[tuple[bool, str]]:
     return [(i % 2 == 0, name) for i, name in enumerate(LOGS)] + [(i % 2 == 1, name) for i, name in enumerate(FIRST)]
 
 
-@pytest.fixture
-def few_candidates(monkeypatch):
-    """The search for a model tries the ends of each of its grids alone, and adds a term three times at most."""
-    for name in ("CUTOFF_GRID", "LAG_GRID", "RIDGE_GRID", "DISPLACEMENT_GRID", "WIDTH_GRID", "DECAY_VELOCITY_GRID"):
-        monkeypatch.setattr(search, name, getattr(search, name)[:: len(getattr(search, name)) - 1])
-    monkeypatch.setattr(search, "MAX_TERMS", 3)
-
-
 @pytest.mark.parametrize(("velocity", "name"), arms())
-@pytest.mark.usefixtures("few_candidates")
 def test_no_log_however_impossible_ends_in_a_bug(tmp_path, name, velocity):
     """Identification, validation and contact are all spoilt, in an arm with or without limits and velocities."""
     folder = tmp_path / "raw" / "bench"
