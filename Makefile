@@ -43,7 +43,7 @@ for folder in sorted((f for f in pathlib.Path("pipeline").rglob("*") if f.is_dir
 endef
 export FORGET
 
-.PHONY: all quick test check format lint types oracles axe approve bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
+.PHONY: all quick test check every-test format lint types oracles axe approve bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
@@ -57,7 +57,9 @@ quick: $(READY_TO_TEST) ## run the tests that take moments, for while you work
 test: $(READY_TO_TEST) ## run the tests (TESTS=--slow for the longest studies, too; WORKERS=n for processes)
 	$(PYTEST) $(TESTS)
 
-check: lint types oracles axe ## what continuous integration checks: format, lint, types, and every test
+check: lint types every-test ## what continuous integration checks: format, lint, types, and every test (-j2: at once)
+
+every-test: oracles axe
 	$(MAKE) --no-print-directory test TESTS=--slow
 
 format: $(READY_TO_CHECK) ## lay out the code, and mend what the linter can
@@ -74,7 +76,7 @@ types: $(READY_TO_CHECK) ## check the types
 oracles: $(READY_TO_COMPARE) ## install what tests compare with, where it is there: Pinocchio
 
 axe: ## install what tests judge the accessibility of a report with, where npm is there
-	@if command -v npm >/dev/null; then npm ci --silent --prefix tests/report || echo "axe could not be installed"; else echo "no npm, so no axe"; fi
+	@if command -v npm >/dev/null; then npm ci --silent --fetch-retries 1 --fetch-retry-mintimeout 1000 --prefix tests/report || echo "axe could not be installed"; else echo "no npm, so no axe"; fi
 
 bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s

@@ -26,6 +26,7 @@ from davinci_forces.records import (
     Residual,
     Trajectory,
 )
+from davinci_forces.records.prediction import ANOTHER_PATH
 from davinci_forces.robots.models import independent
 from davinci_forces.stages.model import fit, predict
 from davinci_forces.stages.recordings import average, differentiate
@@ -299,6 +300,14 @@ def test_the_path_of_a_fitted_log_is_new_only_where_no_other_fitted_log_follows_
     assert path_new(one, [trajectory(one)]) == 1.0  # its own path tells nothing
     assert path_new(one, [trajectory(one), trajectory(again)]) < 0.01
     assert path_new(other, [trajectory(one), trajectory(again)]) > 0.1
+
+
+def test_a_path_of_which_a_third_is_new_is_another():
+    seen, signal = [trajectory(arm.signal(log="seen"))], arm.signal(seed=9, log="other")
+    signal = replace(signal, q=signal.q + 0.7 * np.std(signal.q) * np.sqrt(2) * np.cos(3.7 * signal.t))
+    identified = Identified(arm.ARM, [r for r in fitted_to(seen) if isinstance(r, FittedPaths)])
+    assert identified.path_new(arm.motion(signal)) == pytest.approx(1 / 3, abs=0.05)
+    assert identified.path(arm.motion(signal)) == ANOTHER_PATH
 
 
 def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_when_they_do_not_stand_for_all():

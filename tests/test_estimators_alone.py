@@ -33,6 +33,14 @@ def test_residuals_that_count_less_beyond_a_size_balance(monkeypatch):
     assert len(steps) < huber.MAX_STEPS_HUBER  # or it would not have converged
 
 
+@pytest.mark.parametrize("estimator", [lse, wlse, huber])
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_an_estimate_is_the_same_whatever_the_unit_of_the_effort(estimator, unit):
+    p = outliers()
+    other = Regression(p.Phi, unit * p.tau, unit**2 * p.tau_var, p.periods, p.starts, p.names)
+    assert_allclose(estimator.estimate(other).theta, unit * estimator.estimate(p).theta, rtol=1e-5)
+
+
 def test_outliers_move_a_robust_fit_by_no_more_than_its_standard_error_says():
     off, std = [], []
     for seed in range(40):

@@ -403,7 +403,7 @@ def test_pages_that_are_made_have_every_field_name_and_robot_once():
         kind = next(kind for kind in KINDS.values() if kind.__name__ == heading)
         assert sorted(re.findall(r"^\| `(\w+)`", part, re.M)) == sorted((*kind.scalars(), *kind.columns()))
     assert re.findall(r"^## davinci_forces\.(\w+)$", pages["api"], re.M) == davinci_forces.__all__
-    assert "Stream.step(" in pages["api"]
+    assert "Stream.step(t: float, q: ArrayLike, tau: ArrayLike, dq: ArrayLike | None=None)" in pages["api"]
     assert "BadRequest" in pages["api"]
     assert re.findall(r"^## (\w+)$", pages["robots"], re.M) == list(robots.ROBOTS)
     assert "hand_roll" in pages["robots"]

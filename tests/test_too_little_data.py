@@ -1,10 +1,15 @@
 """Data that do not tell what is asked of them: a clear statement from every stage, never a silently wrong number."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from davinci_forces.records import Choice, Diagnostic, Fit, Signal
+from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, free_space
+from davinci_forces.records import Choice, Diagnostic, FilterNoise, Fit, JointModel, Signal
+from davinci_forces.stages.forces import benchmark
 from davinci_forces.stages.model import choose, fit
+from davinci_forces.study import LogEntry
 from tests import arm
 from tests.test_estimation import trajectory
 
@@ -72,3 +77,20 @@ def test_three_periods_have_no_weights_and_are_fitted_otherwise():
     texts = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
     assert any("wlse is left out: weights need at least 4 periods" in text for text in texts)
     assert "lse" in {record.estimator for record in made if isinstance(record, Fit)}
+
+
+@pytest.mark.parametrize(("samples", "is_compared"), [(99, False), (100, True)])
+def test_filters_are_compared_from_a_hundred_samples_of_free_motion_on(samples, is_compared):
+    identified = list(fit.run([trajectory(arm.signal("hand_roll"))], [], arm.ARM, lowpass=17.0))
+    fits = [record for record in identified if isinstance(record, Fit)]
+    log = arm.signal("hand_roll", seed=1, periods=2, role="validation", log="check")
+    model = next(record for record in arm.models([log], fits) if isinstance(record, JointModel))
+    free = np.flatnonzero(free_space(model.t, (), model.rate))
+    left_out = np.full(len(model), UNSCORED_SAMPLE)
+    left_out[free[:samples]] = 0
+    noise = FilterNoise(
+        "hand_roll", ("run",), RATE, 1e-4, 1e-3, arm.NOISE["hand_roll"], 1.0, 0.1, 0.02, 0.1, np.ones(1), np.ones(1)
+    )
+    entry = LogEntry("check", ("check.csv",), "validation", ())
+    made = list(benchmark.run(replace(model, unscored=left_out), fits, noise, entry, arm.ARM, q_tau=0.0))
+    assert bool(made) == is_compared

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.filters import ekf
 from davinci_forces.filters.innovations import coloured
 from davinci_forces.filters.innovations.innovations import correct_times, delays, innovations
-from davinci_forces.filters.innovations.search import classify, search, verdict
+from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
 from davinci_forces.filters.innovations.trials import (
     CLOCK,
     COLOUR,
@@ -20,6 +20,7 @@ from davinci_forces.filters.innovations.trials import (
     WALK,
     Passes,
     Subject,
+    Trial,
 )
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
@@ -303,6 +304,13 @@ def test_the_other_joints_tell_an_uneven_clock_and_it_is_named():
     assert set(found.nearest().without) == {CLOCK}
     assert found.share(found.nearest()) > 0.95
     assert "uneven sampling times" in verdict(found)
+
+
+def test_the_share_of_a_cause_is_that_of_the_excess_however_small():
+    whole = Trial((), N, (0.5, 0.5), (0.5, 0.5), excess=4e-3, walk=1.0)
+    less = whole._replace(without=(SIZES,), excess=1e-3)
+    assert CauseSearch([whole, less], []).share(less) == pytest.approx(0.75)
+    assert CauseSearch([whole._replace(excess=0.0), less], []).share(less) == 0.0
 
 
 def test_a_joint_has_no_say_in_its_own_delays():

@@ -1,6 +1,5 @@
 """The log readers' work and their rivals', timed alike: from a file to Parquet, in this process."""
 
-import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -65,11 +64,11 @@ def nptdms_alone(log: Path) -> float:
 
 
 def seconds(*works: Callable[[], object], repeats: int = 5) -> list[float]:
-    """The median times of some works [s], taken in turn, so that what disturbs one disturbs the others."""
+    """The least times of the processor that some works take [s], in turn: what else the machine does can only add."""
     times: list[list[float]] = [[] for _ in works]
     for _ in range(repeats):
         for work, taken in zip(works, times, strict=True):
-            start = time.perf_counter()
+            start = time.process_time()
             work()
-            taken.append(time.perf_counter() - start)
-    return [statistics.median(taken) for taken in times]
+            taken.append(time.process_time() - start)
+    return [min(taken) for taken in times]

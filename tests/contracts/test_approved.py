@@ -27,7 +27,7 @@ from tests.contracts.test_sections import context, written
 
 APPROVED = Path(__file__).with_name("approved")
 SHARE, SHARE_OF_RECORDS, SHARE_OF_STD, SHARE_OF_CURVES = 1e-6, 1e-5, 1e-3, 1e-3
-SENTENCE = re.compile(r"^ *(text|items|caption|alt|title): ")
+SENTENCE = re.compile(r"^( *(text|items|caption|alt|title): |\S)")  # the lines of a paragraph begin at the margin
 CURVE = re.compile(r"^( *[\w: ]*\([\d, ]+\)) (.*)$")
 
 

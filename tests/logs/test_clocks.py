@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -82,6 +83,13 @@ def test_a_start_offset_of_one_channel_shifts_it_alone() -> None:
     assert_allclose(times_of(log, "a/q", samples), [0, 0.01], rtol=1e-12)
     assert_allclose(times_of(log, "a/i", samples), [0.5, 0.51], rtol=1e-12)
     assert log.find("a/i").time == "time of a/i"
+
+
+def test_channels_that_are_described_anew_are_grouped_by_their_new_clocks() -> None:
+    log, _ = read(tdms({"a/q": ([1, 2], said(0, 0.01)), "a/i": ([3, 4], said(0, 0.01, 0.5))}), "log.tdms")
+    assert log.by_clock(["a/q", "a/i"]) == {"": ["a/q"], "time of a/i": ["a/i"]}
+    log.channels = tuple(replace(channel, time="") for channel in log.channels)
+    assert log.by_clock(["a/q", "a/i"]) == {"": ["a/q", "a/i"]}
 
 
 def test_channels_that_began_a_fiftieth_of_a_sample_apart_have_one_clock() -> None:

@@ -1,5 +1,7 @@
 """Bags of ROS 1 and 2: joints by number and by name, clocks of headers and of the recorder, and bags that are odd."""
 
+import itertools
+import struct
 import sys
 from pathlib import Path
 
@@ -193,6 +195,16 @@ def test_signs_in_the_names_of_folders_and_files_mean_nothing(kind, tmp_path):
     if bag.is_dir():
         [storage] = [file for file in bag.iterdir() if file.suffix != ".yaml"]
         assert len(column(open_log(storage), "effort[1]")[0]) == len(T)
+
+
+def test_fields_of_a_record_of_ros_1_are_read_in_any_order():
+    from davinci_forces.logs.ros.rosbag1 import _fields
+
+    message = (b"op=\x02", b"conn=\1\0\0\0", b"time=\1\2\3\4\5\6\7\x08")
+    later = (*message[:2], b"time=\2\2\3\4\5\6\7\x08")
+    for fields in (*itertools.permutations(message), *itertools.permutations(later)):
+        header = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+        assert _fields(header) == dict(field.split(b"=") for field in fields)
 
 
 @pytest.mark.medium

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import CandidatePart, Library
 from davinci_forces.identification.chosen import reason
-from davinci_forces.identification.observations import CellEquations
+from davinci_forces.identification.observations import CellEquations, Observed
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
@@ -71,6 +71,15 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     for out in (*np.eye(CELLS, dtype=bool), *np.eye(CELLS, dtype=bool)):
         assert_allclose(made.theta(cells, out), 1.0, rtol=1e-9)
     assert len(solved) == CELLS
+
+
+@pytest.mark.parametrize(("period", "refit"), [([0, 0, 0, -1], [0, 0, 0, -1]), ([-1] * 4, [0] * 4)])
+def test_a_log_that_is_left_out_is_predicted_in_its_periods_or_whole_if_it_has_none(period, refit):
+    log = Observed((), (), np.empty((4, 0)), np.zeros(4, int), np.array(period), 17.0, 0, {})
+    two = SimpleNamespace(logs={0: log, 1: log}, total=2, by_block=None)
+    scheme = unseen.scheme_of_own_fits(two, log)
+    assert scheme.refit.tolist() == refit
+    assert scheme.out.tolist() == [[True] * PATH_BLOCKS + [False] * PATH_BLOCKS]
 
 
 def test_what_is_predicted_has_not_been_seen():

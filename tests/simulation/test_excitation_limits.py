@@ -187,3 +187,11 @@ def test_ranges_of_a_design_touch_a_limit(two):
     problem = problem_of(two, harmonics=2, samples=40)
     speeds = [max(map(abs, ranges(s)[1])) / 2.16 for s in design_together(problem, 1, 1).series]
     assert max(speeds) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_motion_within_its_limits_is_not_shrunk(six):
+    up = Obstacles(floor=0.0)
+    series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 0.3)], 10.0) for a0 in (0.0, -1.2, 0.4, -0.8, 0.5, 0.0)]
+    limits = problem_of(six, obstacles=up).limits
+    assert limits.present
+    assert shrink_into_arm_limits(limits, series) == series

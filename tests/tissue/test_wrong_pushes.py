@@ -73,6 +73,13 @@ def test_a_log_without_a_force_is_said():
     assert "no force or no depth is known" in palpated()[3][0]
 
 
+def test_a_log_of_fewer_than_eight_samples_is_said_to_tell_no_push():
+    t, depth = np.arange(8) / 4, np.sin(np.arange(8))
+    seven, eight = (palpated([touch(t[:N], depth=depth[:N], force=depth[:N])])[3] for N in (7, 8))
+    assert "no push can be found" in seven[0]
+    assert not any("no push can be found" in text for text in eight)
+
+
 def test_a_log_of_another_role_is_left_alone():
     from davinci_forces.stages.tissue import palpate
     from tests import arm

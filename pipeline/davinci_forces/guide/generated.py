@@ -1,8 +1,10 @@
 """Pages of the reference that are made from code when they are asked for: fields of records, Python, and robots."""
 
+import ast
 import inspect
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from textwrap import dedent
 
 
 def fields() -> str:
@@ -68,12 +70,19 @@ PAGES = {  # topic -> title, summary and body
 }
 
 
-def document_function(name: str, what: object, level: int = 2) -> Iterator[str]:
+def document_function(name: str, what: Callable[..., object], level: int = 2) -> Iterator[str]:
     """A function as a heading, its signature, and its docstring."""
-    signature = str(inspect.signature(what)) if callable(what) else ""
-    signature = signature.replace("self, ", "").replace("(self)", "()")
     yield f"{'#' * level} {name}"
-    yield f"```text\n{name}{signature}\n\n{inspect.getdoc(what)}\n```"
+    yield f"```text\n{name}{signature(what)}\n\n{inspect.getdoc(what)}\n```"
+
+
+def signature(function: Callable[..., object]) -> str:
+    """Parameters and result with their types as the source states them: some fill a page once they are evaluated."""
+    [definition] = ast.parse(dedent(inspect.getsource(function))).body
+    assert isinstance(definition, ast.FunctionDef)
+    arguments = definition.args
+    arguments.args = [one for one in arguments.args if one.arg != "self"]
+    return f"({ast.unparse(arguments)})" + (f" -> {ast.unparse(definition.returns)}" if definition.returns else "")
 
 
 def first_sentence(doc: str | None) -> str:

@@ -48,8 +48,12 @@ class Library:
     @cached_property
     def inertias(self) -> Array:
         """The columns (S, m, m, p) of M = inertias theta at some poses along the trajectories."""
-        poses = [log.motions[0].q[:: max(1, len(log.block) // POSES)] for log in self.logs]
-        return self.model.inertia_columns(np.concatenate(poses))
+        steps = [max(1, len(log.block) // POSES) for log in self.logs]
+        poses = np.concatenate([
+            np.column_stack([record.q[::step] for record in log.records])
+            for log, step in zip(self.logs, steps, strict=True)
+        ])  # fmt: skip
+        return self.model.inertia_columns(poses)
 
     @property
     def combination(self) -> Array:
@@ -266,7 +270,8 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
-        q, dq = (x[:, i][is_evaluated(log.records[i])] for x in (log.motions[i].q, log.motions[i].dq))
+        record = log.records[i]
+        q, dq = (x[is_evaluated(record)] for x in (record.q, record.dq))
         low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
         squares += float(dq @ dq)

@@ -93,7 +93,7 @@ def without_a_segment(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
-    Phi = model.regressor(log.motions[0]).Phi[:, 0]
+    Phi = model.regressor(recorded_motion(motion)).Phi[:, 0]
     scorer = Scorer(motion, is_evaluated(motion), lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))

@@ -11,13 +11,11 @@ from davinci_forces.identification.regression import (
     averaged_motion,
     joined_motion,
     motion_at,
-    recorded_motion,
     stands_still,
 )
 from davinci_forces.identification.scores import select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
-from davinci_forces.maths.models.memory import select_samples as first_samples
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.periods.agreement import repetitions
 from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, path_blocks, side_by_side, sum_equations
@@ -39,7 +37,6 @@ class Observed(NamedTuple):
 
     records: tuple[Motion, ...]  # of n joints
     processing: tuple[Processing, ...]  # for the effort of each joint
-    motions: tuple[ArmMotion, ...]  # of all joints, as the effort of each joint is modelled with
     still: Booleans  # (N, n) whether each joint stands still, so that its friction is undetermined
     block: Integers  # (N,) of the path
     period: Integers  # (N,) number of the repetition of the path; -1 if it does not repeat
@@ -59,28 +56,27 @@ class Observed(NamedTuple):
 
     def single_joint(self, joint: int) -> "Observed":
         """Return the log of one joint alone."""
-        column, motion = slice(joint, joint + 1), self.motions[joint]
-        motion = motion._replace(**{name: getattr(motion, name)[:, column] for name in ("q", "dq", "ddq")})
+        column = slice(joint, joint + 1)
         records, processing, still = self.records[column], self.processing[column], self.still[:, column]
-        return self._replace(records=records, processing=processing, motions=(motion,), still=still)
+        return self._replace(records=records, processing=processing, still=still)
 
     def first_samples(self, number: int) -> "Observed":
         """Return the first samples of a longer log."""
         if number >= len(self.block):
             return self
-        which = slice(number)
+        which = np.arange(number)  # a slice would keep the whole log in memory
         return self._replace(
             records=tuple(select_samples(record, which) for record in self.records),
-            motions=tuple(first_samples(motion, which) for motion in self.motions),
             **{name: getattr(self, name)[which] for name in ("still", "block", "period")},
         )
 
     def process(self, processing: Sequence[Processing]) -> "Observed":
         """Return the log with another processing for the effort of each joint."""
-        motions = {
-            p: joined_motion([motion_at(record, *p) for record in self.records]) for p in dict.fromkeys(processing)
-        }
-        return self._replace(processing=tuple(processing), motions=tuple(motions[p] for p in processing))
+        return self._replace(processing=tuple(processing))
+
+    def motion(self, joint: int) -> ArmMotion:
+        """Compute the motion of all joints, as the effort of a joint is modelled with; a long log's is not kept."""
+        return joined_motion([motion_at(record, *self.processing[joint]) for record in self.records])
 
     def rows(self, model: Model) -> tuple[Array, Array, Integers]:
         """Return low-passed Phi (K, m, p) and tau (K, m) of a model of these joints, and their samples (K,).
@@ -99,7 +95,7 @@ class Observed(NamedTuple):
         parts = {}
         for processing in dict.fromkeys(self.processing[i] for i in columns):
             efforts = [m for m, i in enumerate(columns) if self.processing[i] == processing]
-            motion = self.motions[columns[efforts[0]]]
+            motion = self.motion(columns[efforts[0]])
             passed = [cutoff or processing.cutoff for cutoff in cutoffs]
             parts[tuple(efforts)] = self._smooth_rows(model, motion, efforts, passed, wanted)
         samples = reduce(np.intersect1d, (taken for _, taken in parts.values()))
@@ -143,7 +139,6 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
     first = records[0]
     by_joint = {a.joint: a for a in averages if a.log == first.log}
     average = next(iter(by_joint.values()), None)
-    motion = joined_motion([recorded_motion(record) for record in records])
     still = np.stack([is_still(record) for record in records], axis=1)
     white = {joint: a.sigma_tau_white for joint, a in by_joint.items()}
     block = path_blocks(first.t, average.period if average else 0.0, np.asarray(~still.all(axis=1)))
@@ -153,7 +148,7 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
         groups = min(average.periods, MAX_GROUPS)  # of whole periods
         period[inside] = repetitions(first.t[inside], average.period) * groups // average.periods
     n, processing = len(records), Processing(lowpass, 0.0)
-    return Observed(tuple(records), (processing,) * n, (motion,) * n, still, block, period, lowpass, number, white)
+    return Observed(tuple(records), (processing,) * n, still, block, period, lowpass, number, white)
 
 
 def is_evaluated(record: Motion) -> Booleans:

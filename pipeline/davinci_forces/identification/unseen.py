@@ -85,7 +85,7 @@ def predict_scheme(
         return
     is_predicted = scheme.refit >= 0
     predicted = {
-        p: efforts(refits.model, thetas, log.motions[i], scheme.refit)[is_predicted]
+        p: efforts(refits.model, thetas, log.motion(i), scheme.refit)[is_predicted]
         for p, i in {p: i for i, p in enumerate(log.processing) if log.joints[i] in refits.model.efforts}.items()
     }
     for m, effort in enumerate(refits.model.efforts):

@@ -91,6 +91,9 @@ class Log:
     cut: bool = False  # the file is truncated, so channels may end in missing samples
     lent: dict[str, str] = field(default_factory=dict)  # by channel without a clock, the one whose clock it is given
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
+    _indexed: tuple[tuple[Channel, ...], dict[str, Channel], set[str]] = field(
+        default=((), {}, set()), init=False, repr=False, compare=False
+    )  # channels, the same by name, and the clocks among them
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
@@ -157,7 +160,7 @@ class Log:
 
     def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
         """Group names of channels by their clock: its time channel, or "" for the clock of the log."""
-        clocks = {channel.time for channel in self.channels}
+        _, clocks = self._index()
         grouped: dict[str, list[str]] = {}
         for name, channel in zip(names, self._find_all(names), strict=True):
             grouped.setdefault(channel.name if channel.name in clocks else channel.time, []).append(name)
@@ -165,8 +168,15 @@ class Log:
 
     def _find_all(self, names: Sequence[str]) -> list[Channel]:
         """Find many channels; a search for each would take the square of the time."""
-        by_name = {channel.name: channel for channel in self.channels}
+        by_name, _ = self._index()
         return [by_name.get(name) or self.find(name) for name in names]
+
+    def _index(self) -> tuple[dict[str, Channel], set[str]]:
+        """Index the channels by name, and the names of clocks: once, as a log may have a clock for each channel."""
+        if self._indexed[0] is not self.channels:
+            by_name = {channel.name: channel for channel in self.channels}
+            self._indexed = self.channels, by_name, {channel.time for channel in self.channels}
+        return self._indexed[1:]
 
     def _numbered(self, number: int) -> Channel:
         written = [channel for channel in self.channels if not channel.derived]
@@ -183,7 +193,7 @@ class Log:
         for name, channel in zip(names, self._find_all(names), strict=True):
             if channel.kind not in SAMPLED_KINDS:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
-        if len(clocks := self.by_clock(names)) > 1:
+        if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
     def count_nans(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:

@@ -65,10 +65,10 @@ class Timeline:
         """Whether both were sampled together; one may have more samples than the other."""
         if self.first != timeline.first:
             return False
-        mine, theirs = np.array([self.start, self.step]), np.array([timeline.start, timeline.step])
-        ends = np.array([*self.first[1:], max(self.rows, timeline.rows)])
-        drifts = np.abs(mine[0] - theirs[0]) + np.abs(mine[1] - theirs[1]) * (ends - self.first)
-        return bool(np.all(drifts <= SKEW * np.minimum(np.abs(mine[1]), np.abs(theirs[1]))))
+        ends = (*self.first[1:], max(self.rows, timeline.rows))
+        parts = zip(self.first, ends, self.start, timeline.start, self.step, timeline.step, strict=True)
+        drifts = ((abs(x - y) + abs(T - S) * (end - begin), min(abs(T), abs(S))) for begin, end, x, y, T, S in parts)
+        return all(drift <= SKEW * step for drift, step in drifts)
 
 
 def group_by_clock(timelines: dict[str, Timeline]) -> list[list[str]]:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from functools import lru_cache
 
 # name -> (what it measures, its size in SI)
 UNITS: dict[str, tuple[str, float]] = {
@@ -63,6 +64,7 @@ INDEX = re.compile(r"\d*|[^\W\d]\w*_\w*|[^\W\d]+ ?\d+")  # `q[0]`, `effort[outer
 CAPITAL = re.compile(r"(?<=[a-z]{3})(?=m(?:A|Nm?)$)|(?<=[a-z])(?=[A-Z])")  # `currentmA`, `angleDeg`
 
 
+@lru_cache(maxsize=1024)
 def canonical(unit: str) -> str:
     """The listed spelling of a unit, or the unit as it stands."""
     unit = unit.strip()
@@ -85,7 +87,7 @@ def unit_in(name: str) -> str:
 
 def split_ratio(name: str) -> tuple[str, str]:
     """Split `time / ms`, a quantity over its unit, into both; the unit of any other name is ""."""
-    for slash in re.finditer("/", "" if measures(name) else name):
+    for slash in re.finditer("/", name if "/" in name and not measures(name) else ""):
         quantity, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
         if not quantity.startswith("/") and not re.search(r"[\[({][^\])}]*$", quantity) and quantity and _is_unit(unit):
             return quantity, unit.strip("()")

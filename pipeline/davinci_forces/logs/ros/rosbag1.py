@@ -4,6 +4,7 @@ import struct
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionFormat
 from rosbags.typesys.msg import normalize_msgtype
@@ -13,7 +14,8 @@ from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
 
 MAGIC_1 = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_RECORD, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
-U32 = struct.Struct("<I").unpack_from
+TIME_FIELD = b"\r\0\0\0time="  # with its length, before the 8 bytes of a time
+U32, TWO_U32 = struct.Struct("<I").unpack_from, struct.Struct("<II").unpack
 Fields = dict[bytes, bytes]
 
 
@@ -63,11 +65,12 @@ class Rosbag1(Scan):
 
     def _records(self, content: memoryview, at: int) -> Iterator[tuple[Fields, int, int]]:
         """Yield the fields of each record, and where its data are; only a chunk may end beyond the content."""
-        while at < len(content):
+        size = len(content)
+        while at < size:
             begin = at + 8 + U32(content, at)[0]
             end = begin + U32(content, begin - 4)[0]
-            fields = _fields(bytes(content[at + 4 : begin - 4]))
-            if end > len(content) and fields[b"op"][0] != CHUNK:
+            fields = _fields(content[at + 4 : begin - 4].tobytes())
+            if end > size and fields[b"op"][0] != CHUNK:
                 raise Damage("a record ends beyond the file")
             yield fields, begin, end
             at = end
@@ -95,7 +98,7 @@ class Rosbag1(Scan):
     def _take(self, kind: int, fields: Fields, content: memoryview, begin: int, end: int) -> None:
         connection = U32(fields[b"conn"])[0]
         if kind == MESSAGE:
-            seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
+            seconds, nanoseconds = TWO_U32(fields[b"time"])
             self.place(connection, seconds * 10**9 + nanoseconds, begin, end)
             return
         about = _fields(bytes(content[begin:end]))
@@ -108,7 +111,14 @@ class Rosbag1(Scan):
 
 
 def _fields(header: bytes) -> Fields:
-    """Read `name=value` fields, each behind its length."""
+    """Read `name=value` fields, each behind its length; those of messages differ in their last, the time, alone."""
+    if header[-17:-8] == TIME_FIELD:
+        return _fields_before(header[:-17]) | {b"time": header[-8:]}
+    return _fields_before(header)
+
+
+@lru_cache(maxsize=1024)
+def _fields_before(header: bytes) -> Fields:
     fields, at = {}, 0
     while at < len(header):
         end = at + 4 + U32(header, at)[0]

@@ -20,7 +20,7 @@ ALL = (slice(None),)  # index of all samples, for numpy
 RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
 # [m, or N/kg] Products of lengths of metres have rounding errors of 1e-15; files state angles to eleven digits.
 MIN_GRAVITY_ENTRY = 1e-6
-COMPILE_FROM = 20_000  # samples; numpy computes fewer before the kernels are loaded
+COMPILE_FROM = 2_000  # samples; numpy computes fewer before the kernels are loaded
 
 
 def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | None = None) -> Array:

@@ -24,6 +24,7 @@ ADDED = ("rotor inertia", "spring", "offset")  # parameters of the drive and the
 NOT_NEGATIVE = (True, True, False)  # of `ADDED`: a spring pulls back, and an offset has either sign
 LINK_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 ADDED_UNITS = ("{inertia}", "{effort}/{position}", "{effort}")
+LINK_SAMPLES = 1 << 12  # whose regressor of all links is in memory at once; few of its columns are used
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,9 @@ class CoupledArm:
         """Phi (N, m, p).  (6.3), (6.9)"""
         N, b = len(motion.q), len(self.base.columns)
         Phi, valid = np.zeros((N, len(self.rows), b + sum(map(len, self.friction)))), np.ones(N, np.bool_)
-        Phi[:, :, :b] = of_links(self.chain, self.rows, motion.q, motion.dq, motion.ddq)[:, :, self.base.columns]
+        for samples in (slice(i, i + LINK_SAMPLES) for i in range(0, N, LINK_SAMPLES)):
+            q, dq, ddq = (x[samples] for x in motion[:3])
+            Phi[samples, :, :b] = of_links(self.chain, self.rows, q, dq, ddq)[:, :, self.base.columns]
         for row, joint, term, column in self._frictions():
             z, z_valid = friction_state(motion, joint, term)
             valid &= z_valid

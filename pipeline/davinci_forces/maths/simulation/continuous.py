@@ -15,7 +15,7 @@ from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import Plant
 from davinci_forces.maths.simulation.control import lyapunov
 
-RELATIVE, ABSOLUTE = 1e-9, 1e-11
+RELATIVE, ABSOLUTE = 1e-7, 1e-10
 
 
 class Regulated(NamedTuple):
