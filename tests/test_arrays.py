@@ -112,6 +112,7 @@ def test_an_external_effort_leaves_the_models_and_the_predictions_as_they_are(id
     pd.testing.assert_frame_equal(before, identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq), check_exact=True)
 
 
+@pytest.mark.filterwarnings("ignore:.*the inertia of chosen.ridge is not positive:UserWarning")
 def test_data_frames_give_the_numbers_of_arrays_with_joints_by_their_names():
     logs = [arm.signal(name, period=2.0, seed=i, **SHORT) for i, name in enumerate((JOINT, "instrument_slide"))]
     q, tau = (np.column_stack([getattr(log, name) for log in logs]) for name in ("q", "tau"))

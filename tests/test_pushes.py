@@ -89,3 +89,17 @@ def test_times_of_contact_have_the_errors_that_are_stated():
     assert len(z) > 200
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.2
     assert np.mean(np.abs(z) < NORMAL_95) > 0.9
+
+
+@pytest.mark.parametrize("r_dq", [2e-3, 0.1])
+@pytest.mark.parametrize("flank", [0.1, 0.15, 0.25, 0.5])
+def test_a_soft_flank_begins_within_its_error_whatever_the_smoother_s_step_is_like(flank, r_dq):
+    """Without noise; flanks are half a period of a cosine.  By a step's steepest slope they were up to 4 errors off."""
+    noise = STARTS._replace(r_dq=r_dq)
+    noise = noise._replace(q_tau=smallest_q_tau(ekf.track, INERTIA, VISCOUS, T_S, noise))
+    rising, falling = (0.5 - 0.5 * np.cos(np.pi * np.clip(x / flank, 0.0, 1.0)) for x in (T - START, START + 3.0 - T))
+    joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, rising * falling, T_S, 1.0)
+    effort, spread = rts.track(joint, noise).tau_ext, rise(rts.track, joint, noise)
+    [found] = events(T, effort, np.full(len(T), 1e-3), 0.05, spread)
+    assert abs(found.onset - START) < 1.25 * found.onset_std
+    assert abs(found.release - START - 3.0) < 1.25 * found.release_std

@@ -114,7 +114,8 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
     T = kinematics.frames(chain, pose)
     J_v, J_w = kinematics.jacobian(chain, pose)
-    singular = chain.n >= tip_force.ARM and bool(tip_force.is_singular(chain, pose))
+    has_force = chain.n >= tip_force.ARM
+    singular = has_force and bool(tip_force.is_singular(chain, pose))
     return {
         "frames": {
             name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
@@ -125,9 +126,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "jacobian_v": J_v.tolist(),
         "jacobian_w": J_w.tolist(),
         **_dynamics(robot, pose, rates),
-        "condition": None
-        if singular or chain.n < tip_force.ARM
-        else float(tip_force.condition(J_v[..., : tip_force.ARM])),
+        "condition": float(tip_force.condition(J_v[..., : tip_force.ARM])) if has_force and not singular else None,
         "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
         "joints": _joints(robot),
     }

@@ -66,13 +66,18 @@ def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: fl
 
 
 def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
-    """Compute the rise time [s] of a filter's unit step response on a joint at rest: 1 / its steepest slope."""
+    """Compute how long [s] a filter takes to show a step of the effort on a joint at rest.
+
+    It is (t(3/4) - t(1/4)) / ln 2 of the step.  If it approaches both of its levels exponentially, as a smoothed random
+    walk does, that is 1 / its steepest slope.
+    """
     T_s, joint = recording.T_s, recording.part(slice(0, 1)).joint
     inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
     step = np.where(t >= BEFORE, 1.0, 0.0)
     stepped = stationary_joint(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
-    return float(T_s / max(np.diff(track(stepped, noise).tau_ext).max(), 1e-9))
+    shown = np.maximum.accumulate(track(stepped, noise).tau_ext)
+    return float(np.diff(np.interp([0.25 * shown[-1], 0.75 * shown[-1]], shown, t))[0] / np.log(2.0))
 
 
 @lru_cache(CACHED_WALKS)

@@ -34,7 +34,7 @@ MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_VELOCITY_RATIO = 5.0  # beyond it or below its inverse, the log contradicts itself, and is refused
 MAX_BEYOND_LIMITS, IMPOSSIBLE = 2.0, 20.0  # as multiples of a joint's limits; a warning, and a refusal
 USUAL_LIMITS = (2.0 * np.pi, 20.0)  # [rad or m, rad/s or m/s] limits of a joint that states none, only to warn
-MIN_JUMP, MAX_USUAL_LIMITS = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
+MIN_JUMP, MAX_USUAL = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
 UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the position; mm only of joints that slide
     (180.0 / np.pi, 'is the velocity in deg/s? write unit = "deg/s" for its channel'),
     (np.pi / 180.0, 'is the position in degrees? write unit = "deg" for its channel'),
@@ -207,7 +207,7 @@ def faults(recording: Recording) -> Iterator[str]:
             f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
     step = np.diff(q)
-    jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL_LIMITS * np.quantile(np.abs(step), 0.99)))
+    jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL * np.quantile(np.abs(step), 0.99)))
     if len(jumps):
         yield (
             f"{name}: the position jumps by {step[jumps[0]]:.3g} within one sample at {recording.t[jumps[0]]:.3f} s"
