@@ -27,7 +27,7 @@ from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term, presliding_friction, smooth_sign, stribeck
-from davinci_forces.maths.selection import CLEARLY, CrossValidation, Ridge, cross_validate, schemes_of, standard_error
+from davinci_forces.maths.selection import CLEARLY, CrossValidation, LeftOut, Ridge, schemes_of, standard_error
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Kind, Robot
@@ -112,11 +112,11 @@ class JointSearch:
             columns = equations.columns(model)
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, len(self.logs))
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
-            steps = []
+            left_out, steps = LeftOut(cells, self._schemes, scored), []
             for strength in neighbours(RIDGE_GRID, near) if near else RIDGE_GRID:
                 ridge = Ridge(strength, np.ones(1), equations.combination)
                 try:
-                    errors = cross_validate(cells, ridge, self._schemes, scored)
+                    errors = left_out.cross_validate(ridge)
                 except np.linalg.LinAlgError:
                     continue
                 steps.append(Step(name, processing, terms, strength, len(columns), errors))

@@ -212,28 +212,37 @@ class CrossValidation(NamedTuple):
         return CrossValidation(self.fitted, self.fitted)
 
 
+class LeftOut:
+    """The equations of cells without each group of every scheme (G, C), and of the group, for candidates to refit.
+
+    The parameters solve `equations`.  The errors are those of `scored`, where candidates of other low-passes share one.
+    """
+
+    def __init__(self, equations: Equations, schemes: Sequence[Booleans], scored: Equations | None = None) -> None:
+        self.all, scored = sum_all(equations), scored or equations
+        self.squares = scored.squares.sum(axis=0)
+        self.schemes = [[(equations.sum_cells(~out), scored.sum_cells(out)) for out in groups] for groups in schemes]
+
+    def cross_validate(self, ridge: Ridge) -> CrossValidation:
+        """Cross-validate a candidate: leave out each group of cells in turn, and predict it.
+
+        Raises
+        ------
+        LinAlgError
+            If the columns of the other cells are linearly dependent.
+        """
+        unseen, fitted, of_all = [], [], solve(self.all, ridge)
+        for groups in self.schemes:
+            unseen.append(np.array([group.errors(solve(kept, ridge))[0] for kept, group in groups]) / self.squares)
+            fitted.append(np.array([group.errors(of_all)[0] for _, group in groups]) / self.squares)
+        return CrossValidation(tuple(unseen), tuple(fitted))
+
+
 def cross_validate(
     equations: Equations, ridge: Ridge, schemes: Sequence[Booleans], scored: Equations | None = None
 ) -> CrossValidation:
-    """Cross-validate a candidate: leave out each group (G, C) of cells in turn, and predict it.
-
-    The parameters solve `equations`.  The errors are those of `scored`, where candidates of other low-passes share one.
-
-    Raises
-    ------
-    LinAlgError
-        If the columns of the other cells are linearly dependent.
-    """
-    scored = scored or equations
-    whole = scored.squares.sum(axis=0)
-    unseen, fitted, of_all = [], [], solve(sum_all(equations), ridge)
-    for groups in schemes:
-        thetas = [solve(equations.sum_cells(~out), ridge) for out in groups]
-        sums = [scored.sum_cells(out) for out in groups]
-        errors = [group.errors(theta)[0] for group, theta in zip(sums, thetas, strict=True)]
-        unseen.append(np.array(errors) / whole)
-        fitted.append(np.array([group.errors(of_all)[0] for group in sums]) / whole)
-    return CrossValidation(tuple(unseen), tuple(fitted))
+    """Cross-validate one candidate, as `LeftOut` does."""
+    return LeftOut(equations, schemes, scored).cross_validate(ridge)
 
 
 def combine_efforts(parts: Sequence[CrossValidation]) -> CrossValidation:
