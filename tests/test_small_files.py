@@ -166,9 +166,9 @@ READ = (
 )
 
 
-def assert_read(path, channels: int, rows: int, total: float) -> None:
+def assert_read(path, channels: int, rows: int, total: float, limit: float = READS_HDF5) -> None:
     seconds, memory, text = took(str(path), python=("-c", READ))
-    assert seconds < READS_HDF5
+    assert seconds < limit
     assert memory < MOST_MEMORY
     assert [float(word) for word in text.split()] == pytest.approx([channels, rows, total], rel=1e-12), text
 
@@ -176,8 +176,8 @@ def assert_read(path, channels: int, rows: int, total: float) -> None:
 @pytest.mark.parametrize("kind", ["variables", "cells"])
 @pytest.mark.slow
 def test_a_matlab_file_of_thousands_of_small_arrays_is_read(tmp_path, kind):
-    """Of 30 000 cells the first 1000 are taken in; what is read are two variables beside them."""
-    path, count, t = tmp_path / "log.mat", 30_000, np.arange(100.0)
+    """Of 15 000 cells the first 1000 are taken in; what is read are two variables beside them."""
+    path, count, t = tmp_path / "log.mat", 15_000, np.arange(100.0)
     with h5py.File(path, "w", userblock_size=512, libver="latest") as file:
         group = file.create_group("#refs#" if kind == "cells" else "s")
         small = [group.create_dataset(f"v{i}", data=t[None, :3]) for i in range(count)]
@@ -189,7 +189,7 @@ def test_a_matlab_file_of_thousands_of_small_arrays_is_read(tmp_path, kind):
             file.create_dataset(name, data=t[None])
     with path.open("r+b") as file:
         file.write(SIGNATURE.ljust(124) + b"\0\2IM")
-    assert_read(path, 2 + (1000 if kind == "cells" else count), len(t), float((t * t).sum()))
+    assert_read(path, 2 + (1000 if kind == "cells" else count), len(t), float((t * t).sum()), READS_HDF5 / 3)
 
 
 @pytest.mark.slow
