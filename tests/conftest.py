@@ -303,14 +303,15 @@ SLOW: dict[str, dict[str, int]] = {
 # Files that take longest: they come first, so that no process ends long before the others, and no two that make the
 # same study are next to each other.
 FIRST = (
-    "test_shipped_studies.py", "guide/test_tutorials.py", "test_impossible_logs.py", "test_faults.py", "test_runs.py",
-    "test_cluster.py", "test_long_logs.py", "test_real_data.py", "simulation/test_excitation_limits.py",
+    "test_other_arms.py", "test_files.py", "guide/test_tutorials.py", "test_impossible_logs.py", "test_faults.py",
+    "test_runs.py", "test_cluster.py", "test_long_logs.py", "test_real_data.py", "simulation/test_excitation_limits.py",
     "contracts/test_approved.py", "test_tampering.py", "test_weighing.py", "contracts/test_sections.py",
     "test_wheel.py", "logs/test_damage.py", "guide/test_notebook.py", "logs/test_bag_study.py", "tissue/test_arm.py",
     "test_compiled.py", "test_robustness.py", "logs/test_ros_cut.py", "robot/test_kernels.py",
     "simulation/test_thesis_study.py", "tissue/test_palpation.py", "simulation/test_excitation.py", "test_ekf.py",
     "tissue/test_tissue_logs.py", "simulation/test_closed_loop.py", "test_period.py", "contracts/test_estimators.py",
-    "report/test_campaign.py", "test_consistent.py", "test_parameter_errors.py",
+    "report/test_campaign.py", "test_consistent.py", "test_parameter_errors.py", "test_shipped_studies.py",
+    "test_small_files.py",
 )  # fmt: skip
 
 
