@@ -20,7 +20,7 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"
-gc.set_threshold(10_000)  # Python's own costs a tenth of the time: modules and tests are many objects to search
+gc.set_threshold(10_000)  # Python's own costs a twentieth of the time: modules and tests are many objects to search
 # How long examples take is a matter of the machine and of what else it does: no test fails of it.
 slow_machine = [HealthCheck.too_slow]
 settings.register_profile("project", deadline=None, derandomize=True, suppress_health_check=slow_machine)

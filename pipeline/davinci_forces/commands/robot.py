@@ -190,6 +190,8 @@ def _singular(chain: Any, q: list[float]) -> str:
 
 def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
     """The document as text, in base axes and SI units, rounding errors as 0."""
+    from davinci_forces.maths.mechanics.tip_force import ARM
+
     lines = [robot.title, "", *_joint_lines(robot)]
     if "frames" not in document:
         return "\n".join([*lines, "", "its geometry is not known; add [[link]] to its file, or use a URDF"])
@@ -206,7 +208,7 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
             lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
     if document["mass"] is not None:
         lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
-    if len(document["jacobian_v"][0]) < 3:  # no force at the tip, so no condition
+    if len(document["jacobian_v"][0]) < ARM:  # no force at the tip, so no condition
         return "\n".join(lines)
     condition = document["condition"]
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])

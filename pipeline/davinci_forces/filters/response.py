@@ -23,7 +23,7 @@ from davinci_forces.filters.problem import (
 )
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
-from davinci_forces.maths.contact.detection import TIP_REACH
+from davinci_forces.maths.contact.detection import STEP_WIDTH, TIP_REACH
 from davinci_forces.maths.models.bias import VISCOUS
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
@@ -68,8 +68,8 @@ def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: fl
 def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     """Compute how long [s] a filter takes to show a step of the effort on a joint at rest.
 
-    It is (t(3/4) - t(1/4)) / ln 2 of the step.  If it approaches both of its levels exponentially, as a smoothed random
-    walk does, that is 1 / its steepest slope.
+    It is T_s of the step with T_seen = 2 (t(3/4) - t(1/4)), so that a contact that begins with a step begins there.  If
+    the step approaches both of its levels exponentially, T_s is 1 / its steepest slope.
     """
     T_s, joint = recording.T_s, recording.part(slice(0, 1)).joint
     inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
@@ -77,7 +77,8 @@ def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     step = np.where(t >= BEFORE, 1.0, 0.0)
     stepped = stationary_joint(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
     shown = np.maximum.accumulate(track(stepped, noise).tau_ext)
-    return float(np.diff(np.interp([0.25 * shown[-1], 0.75 * shown[-1]], shown, t))[0] / np.log(2.0))
+    lower, upper = np.interp([0.25 * shown[-1], 0.75 * shown[-1]], shown, t)
+    return float(2.0 * (upper - lower) / STEP_WIDTH)
 
 
 @lru_cache(CACHED_WALKS)
