@@ -32,7 +32,7 @@ from davinci_forces.maths.uncertainty.bootstrap import (
 )
 from davinci_forces.maths.uncertainty.day_offset import day_offset
 from davinci_forces.maths.uncertainty.error_band import levels
-from davinci_forces.records import Contact, Threshold, Track
+from davinci_forces.records import Contact, Diagnostic, Threshold, Track
 from davinci_forces.report.content import Number
 from davinci_forces.report.sections.contacts import interval, largest
 from davinci_forces.stages.forces import assess, measure
@@ -54,7 +54,8 @@ def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_re
         "tau_ext_smooth_std": zero + std,
     }
     standing = np.full(len(T), at_rest) if standing is None else standing.astype(int)
-    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, "standing": standing, **efforts}
+    more = {"dq": zero} | more
+    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, "dq": more.pop("dq"), "standing": standing, **efforts}
     scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest, "rate": RATE, "filter": "ekf"} | more
     return Track(**columns, **scalars | {"log": log, "joint": joint, "role": role, "model": "m", "estimator": "e"})
 
@@ -373,6 +374,22 @@ def test_a_contact_that_no_window_states_is_found_and_said_to_be():
     [free] = measured(track(push, role="validation"), quiet_threshold, entry(role="validation"))
     assert free.stated.tolist() == [0, 0]
     assert not measured(track(noise(std=0.01), role="validation"), quiet_threshold, entry(role="validation"))
+
+
+@pytest.mark.parametrize(("peak", "pause", "stated", "contacts"), [
+    (0.3, 1.0, False, 0), (0.3, 1.0, True, 1), (0.5, 1.0, False, 1), (0.3, 0.4, False, 1),
+])  # fmt: skip
+def test_what_static_friction_explains_while_a_joint_hardly_moves_is_no_contact(peak, pause, stated, contacts):
+    """An effort from 20.2 to 20.8 s counts above a friction of 0.4, where the joint moves, or in a stated window."""
+    effort = noise(std=0.01) + np.where((T >= 20.2) & (T <= 20.8), peak, 0.0)
+    quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.1, 0.01, "c", 1, 0.95, 0.01, 0.2)]
+    dq = np.where(np.abs(T - 20.5) <= 0.5 * pause, 0.001, 1.0)
+    about = entry(role="contact", contact=((20.2, 20.8),) if stated else ())
+    records = measured(track(effort, std=0.01, dq=dq, static_friction=0.4), quiet, about)
+    assert len([record for record in records if isinstance(record, Contact)]) == contacts
+    notes = [text for record in records if isinstance(record, Diagnostic) for text in record.text]
+    assert len(notes) == 1 - contacts
+    assert all("an effort at 20." in note and "of up to 0.3" in note and "0.4 N m" in note for note in notes)
 
 
 def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():

@@ -13,6 +13,7 @@ from davinci_forces.maths.contact.detection import (
     typical_alarm_level,
     without_rounding,
 )
+from davinci_forces.maths.signals.standstill import SLOW
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
@@ -48,7 +49,10 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     ]
     pairs = match_windows(sorted(entry.contact), detected)
     placed = [(window, event, stated) for window, event, stated in pairs if event or not track.at_rest]
-    if placed:
+    friction = [window for window, _, stated in placed if not stated and is_friction(track, window)]
+    if friction:
+        yield friction_note(track, friction, robot)
+    if placed := [pair for pair in placed if pair[0] not in friction]:
         yield from contacts(track, threshold, placed)
 
 
@@ -150,6 +154,30 @@ def unknown_friction(track: Track) -> Array:
     """
     spread = [(start - TRANSIENT, end + TRANSIENT) for start, end in spans(track.t, track.standing > 0)]
     return np.where(is_outside(track.t, spread), 0.0, track.static_friction)
+
+
+def is_friction(track: Track, window: Window) -> bool:
+    """Whether static friction explains the effort in a window: the joint sticks throughout, and the effort is less."""
+    slow, inside = np.abs(track.dq) <= SLOW * np.sqrt(np.mean(track.dq**2)), ~is_outside(track.t, [window])
+    return bool(np.all(slow[inside])) and largest_effort(track, window) <= track.static_friction
+
+
+def largest_effort(track: Track, window: Window) -> float:
+    """The largest smoothed effort in a window."""
+    return float(np.abs(track.tau_ext_smooth[~is_outside(track.t, [window])]).max(initial=0.0))
+
+
+def friction_note(track: Track, windows: Sequence[Window], robot: Robot) -> Diagnostic:
+    """Note the efforts that static friction explains, so that they do not count as contacts."""
+    unit = robot.joint(track.joint).unit("{effort}")
+    first = f"at {windows[0][0]:.4g} s" + (f", the first of {len(windows)}," if windows[1:] else "")
+    largest = max(largest_effort(track, window) for window in windows)
+    text = (
+        f"{track.log}/{track.joint}: an effort {first} of up to {largest:.2g} {unit} does not count as a contact: the "
+        f"joint hardly moves, so static friction may be the cause (up to {track.static_friction:.2g} {unit}); state a "
+        "window of contact in study.toml if something touched the arm"
+    )
+    return diagnostic("measure", f"{track.log}.{track.joint}.friction", "note", text)
 
 
 def stiction_note(track: Track, robot: Robot) -> Diagnostic:
