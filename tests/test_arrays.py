@@ -163,6 +163,9 @@ def test_notebooks_show_parameters_efforts_and_contacts(identified):
     assert len(ax.patches) == len(effort.contacts)
     [ax] = identified.plot()
     assert {text.get_text() for text in ax.get_legend().texts} == {"measured", "model"}
+    first, model, second, _ = (line.get_xdata() for line in ax.lines)
+    assert_allclose(model, first)
+    assert first[-1] == second[0], "the second log follows the first one"
 
 
 LOG = {"t": FIRST.t, "q": FIRST.q, "tau": FIRST.tau, "joints": JOINT}

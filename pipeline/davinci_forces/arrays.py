@@ -216,12 +216,15 @@ class IdentifiedArm:
         return ExternalEffort(tuple(tracks), tuple(contacts), tuple(map(self._effort_label, tracks)), texts)
 
     def plot(self) -> Any:
-        """Plot the measured and the predicted effort of the logs that identified; returns the axes, one a joint."""
+        """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
         axes = axes_of(len(self.fits))
         for ax, joint in zip(axes, self.fits, strict=True):
+            shift = 0.0
             for i, model in enumerate(model for model in self.models if model.joint == joint):
-                ax.plot(model.t, model.tau, "C0", lw=0.7, label="" if i else "measured")
-                ax.plot(model.t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
+                t = model.t + (shift - model.t[0] if i else 0.0)
+                ax.plot(t, model.tau, "C0", lw=0.7, label="" if i else "measured")
+                ax.plot(t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
+                shift = t[-1]
             ax.set_ylabel(self._effort_label(self.fits[joint], joint))
             ax.set_title(joint, loc="left", fontsize="medium")
         axes[0].legend(loc="upper right")

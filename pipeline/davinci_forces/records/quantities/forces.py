@@ -26,7 +26,7 @@ FORCES = {
     "band_width": Quantity("mean of 1.96 stated standard deviations of the external effort in free space", "{effort}"),
     "level_from": Quantity("log whose free space sets the detection level", ""),
     "alarm_level_std": Quantity("standard error of the alarm level, for free motion of another run", "{effort}"),
-    "alarm_level": Quantity("level that free motion crosses at most once in ten minutes", "{effort}"),
+    "alarm_level": Quantity("level that free motion like the logs' crosses at most once in ten minutes", "{effort}"),
     "free_max": Quantity("largest external effort in free space", "{effort}"),
     "crossings": Quantity("upward crossings of zero a second, of the external effort in free space", "Hz"),
     "quartile_coverage": Quantity("coverage in a quartile of speed, standstill left out"),

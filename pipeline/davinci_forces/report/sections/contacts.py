@@ -27,12 +27,12 @@ def section(context: Context) -> Iterator[Block]:
             "most once in ten minutes, if the interval of the peak, without its flattening, does not hold zero. Onset "
             "and release are the times at which the effort leaves zero and returns to it. The peak is the largest "
             "external effort in the window. Mean and impulse (mean times time) are those of measured minus modelled "
-            "effort, which no smoothing moves out of the window. Their standard errors are their spread over windows "
-            "of the same length in free space; that of an impulse includes those of onset and release if no window is "
-            "stated. The standard error of a peak also includes the smoother's standard deviation there, and the "
-            "height by which smoothing flattens the peak. Peaks are judged by the detection level, which is lower "
-            "than the alarm level: 99 % of the samples of the joint's worst run in free space "
-            f"stay below it. Alarm levels: {alarm_levels(context, contacts)}."
+            "effort, which no smoothing moves out of the window, so the mean of a short push may exceed its peak. "
+            "Their standard errors are their spread over windows of the same length in free space; that of an impulse "
+            "includes those of onset and release if no window is stated. The standard error of a peak also includes "
+            "the smoother's standard deviation there, and the height by which smoothing flattens the peak. Peaks are "
+            "judged by the detection level, which is lower than the alarm level: 99 % of the samples of the "
+            f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)
         caption = (

@@ -123,8 +123,8 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
         "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
-        "delays, over the smoother's. Alarm level: crossed in free motion at most once in ten minutes, of all logs of "
-        "the joint; and the number of measured contacts that exceed it."
+        "delays, over the smoother's. Alarm level: free motion like that of the joint's logs crosses it at most "
+        "once in ten minutes. Contacts found: the number of measured contacts that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(caption, header, rows, "stream", "llrrrrrr")

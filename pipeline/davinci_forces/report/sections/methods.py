@@ -121,8 +121,9 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
     )),
     (records.Threshold, (
         Prose("**Detection.** A contact lasts while the smoothed effort (Bierman, 1973) exceeds the alarm level. This "
-              "is the larger of two: the largest effort in free motion, and the level that free motion crosses once in "
-              "ten minutes (Rice, 1944). The detection level of the tables is the 99 % quantile of $abs(e)$."),
+              "is the larger of two: the largest effort in free motion, and the level that free motion like that of "
+              "the logs crosses once in ten minutes (Rice, 1944). The detection level of the tables is the 99 % "
+              "quantile of $abs(e)$."),
         Equation("cal(l) = max(max abs(e), sqrt(overline(e^2)) sqrt(2 ln(600 z_0)))",
                  "the alarm level: root mean square times the root of twice the logarithm of 600 s times the "
                  "crossing rate", "detection"),

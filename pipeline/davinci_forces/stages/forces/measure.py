@@ -29,6 +29,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     """Measure the contacts of one joint: in windows that the study states, and others above the alarm level.
 
     At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
+    Outside the windows, what static friction explains while the joint hardly moves is noted, and is no contact.
     In the last moments of a log the smoother has no later samples, so no contact begins there.
     A window on a joint at rest counts only if a contact was detected in it.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
