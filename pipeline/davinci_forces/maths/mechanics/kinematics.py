@@ -4,9 +4,10 @@ Shapes: `q` is (..., n) in rad or m, with any leading axes.  If the chain has mo
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
@@ -70,8 +71,8 @@ def _jacobian(chain: Chain, T: Array, n: int, body: int, point: Array) -> tuple[
     return J_v, J_w
 
 
-def evaluate_in_blocks(function: Callable[[Array], Array], q: Array) -> Array:
-    """Evaluate a function of poses (N, n) in blocks: the poses of all bodies at all samples may take gigabytes."""
+def evaluate_in_blocks(function: Callable[[Any], NDArray[Any]], q: NDArray[Any]) -> NDArray[Any]:
+    """Evaluate a function of poses (N, ...) in blocks: the poses of all bodies at all samples may take gigabytes."""
     return np.concatenate([function(q[i : i + POSES_AT_ONCE]) for i in range(0, max(len(q), 1), POSES_AT_ONCE)])
 
 

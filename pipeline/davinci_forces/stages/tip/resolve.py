@@ -91,7 +91,8 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     tracks = [by_joint[name] for name in names]
-    if bool(is_singular(robot.chain, np.stack([track.q for track in tracks], axis=-1)).all()):
+    chain, q = robot.chain, np.column_stack([track.q for track in tracks])
+    if bool(evaluate_in_blocks(lambda block: is_singular(chain, block), q).all()):
         if entry.role in ("contact", "tissue"):
             why = "no pose determines all its directions, as where the last frame lies on a joint's axis"
             message = f"{entry.name}: no force at the tip: {why}; add a fixed link to the tip of the tool"
@@ -132,17 +133,16 @@ def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array
 
 def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
     """The force at the tip in one log, by the smoother, since different lags of the joints would turn the force."""
-    first, q = tracks[0], np.stack([track.q for track in tracks], axis=-1)
-    J = evaluate_in_blocks(lambda block: jacobian(chain, block)[0], q)
-    names = ("tau_ext_smooth", "tau_ext_smooth_std")
-    tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in names)
-    f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, matrix(*rho.tolist())))
-    blur, (x, y, z) = condition(J), evaluate_in_blocks(lambda block: tip(chain, block), q).T
+    first, R = tracks[0], matrix(*rho.tolist())
+    of_joints = [getattr(t, name) for name in ("q", "tau_ext_smooth", "tau_ext_smooth_std") for t in tracks]
+    forces = evaluate_in_blocks(lambda block: forces_in_block(chain, block, R), np.column_stack(of_joints))
+    f, C, blur, (x, y, z) = forces[:, :3], forces[:, 3:12].reshape(-1, 3, 3), forces[:, 12], forces[:, 13:].T
     near = blur > NEAR_SINGULAR
     tested = free & ~near
     space = UNKNOWN
     if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE:  # within the 95 % ellipsoids
-        space = levels(np.linalg.norm(f[tested], axis=1), tip_force.reach_95(f[tested], C[tested]) / NORMAL_95)
+        reach = evaluate_in_blocks(lambda k: tip_force.reach_95(f[k], C[k]), np.flatnonzero(tested))
+        space = levels(np.linalg.norm(f[tested], axis=1), reach / NORMAL_95)
     return TipForce(
         log=first.log, role=first.role, filter=first.filter, model=first.model, tested=int(tested.sum()),
         force_rms=space.rms, force_rms_std=space.rms_std, force_level=space.level_95,
@@ -154,6 +154,14 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
         c_xz=C[:, 0, 2], c_yz=C[:, 1, 2], condition=np.minimum(blur, np.finfo(float).max),
         near_singular=near.astype(np.int64),
     )  # fmt: skip
+
+
+def forces_in_block(chain: Chain, of_joints: Array, R: Array) -> Array:
+    """Force (3), its covariance (9), condition number and tip (3) in rows (N, 16), of q, tau_ext and std (N, 9)."""
+    q, tau_ext, std = np.split(of_joints, 3, axis=1)
+    J, _ = jacobian(chain, q)
+    f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, R))
+    return np.column_stack([f, C.reshape(-1, 9), condition(J), tip(chain, q)])
 
 
 def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
