@@ -15,11 +15,11 @@ from davinci_forces.maths.selection import (
     MAX_GROUPS,
     PATH_BLOCKS,
     CrossValidation,
+    LeftOut,
     Ridge,
     choose_candidate,
     combine_efforts,
     covariance,
-    cross_validate,
     path_blocks,
     penalty,
     schemes_of,
@@ -86,7 +86,7 @@ def test_what_is_predicted_has_not_been_seen():
     """Effort that only one cell holds is predicted from the others, which know nothing of it."""
     tau = TAU + 100.0 * (CELL == 0)[:, None] * PHI[:, :, 0]
     schemes = [np.eye(CELLS, dtype=bool)]
-    by_itself = cross_validate(sum_equations(PHI, tau, CELL, CELLS), PLAIN, schemes)
+    by_itself = LeftOut(sum_equations(PHI, tau, CELL, CELLS), schemes).cross_validate(PLAIN)
     kept = CELL != 0
     theta, *_ = np.linalg.lstsq(PHI[kept, 0], tau[kept, 0])
     error = tau[~kept, 0] - PHI[~kept, 0] @ theta

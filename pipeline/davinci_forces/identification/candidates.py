@@ -22,9 +22,9 @@ from davinci_forces.maths.models.terms import Term, offset, presliding_friction
 from davinci_forces.maths.selection import (
     CrossValidation,
     Equations,
+    LeftOut,
     Ridge,
     combine_efforts,
-    cross_validate,
     solve,
     sum_all,
 )
@@ -142,7 +142,7 @@ class Candidate(NamedTuple):
         for part in self.parts:
             cells, scored = (part.by_period, None) if by_period else (part.by_block, part.score_cells)
             try:
-                results.append(cross_validate(cells, part.ridge, schemes, scored))
+                results.append(LeftOut(cells, schemes, scored).cross_validate(part.ridge))
             except np.linalg.LinAlgError:
                 return None
         return combine_efforts(results)

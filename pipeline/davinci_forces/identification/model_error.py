@@ -27,9 +27,9 @@ from davinci_forces.maths.selection import (
     PATH_BLOCKS,
     CrossValidation,
     Equations,
+    LeftOut,
     Ridge,
     covariance,
-    cross_validate,
     schemes_of,
     solve,
     standard_error,
@@ -100,7 +100,7 @@ def other_models(
     schemes = schemes_of(part.library.cells.scored.squares, logs)
     for model in (more for p in same for more in with_offset(p)):
         try:
-            yield model, cross_validate(model.by_block, model.ridge, schemes, model.score_cells)
+            yield model, LeftOut(model.by_block, schemes, model.score_cells).cross_validate(model.ridge)
         except np.linalg.LinAlgError:
             continue
 

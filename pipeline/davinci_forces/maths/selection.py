@@ -238,13 +238,6 @@ class LeftOut:
         return CrossValidation(tuple(unseen), tuple(fitted))
 
 
-def cross_validate(
-    equations: Equations, ridge: Ridge, schemes: Sequence[Booleans], scored: Equations | None = None
-) -> CrossValidation:
-    """Cross-validate one candidate, as `LeftOut` does."""
-    return LeftOut(equations, schemes, scored).cross_validate(ridge)
-
-
 def combine_efforts(parts: Sequence[CrossValidation]) -> CrossValidation:
     """Combine the fits to different efforts into one candidate."""
     columns = zip(*parts, strict=True)
