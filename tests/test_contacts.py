@@ -376,14 +376,15 @@ def test_a_contact_that_no_window_states_is_found_and_said_to_be():
     assert not measured(track(noise(std=0.01), role="validation"), quiet_threshold, entry(role="validation"))
 
 
-@pytest.mark.parametrize(("peak", "pause", "stated", "contacts"), [
-    (0.3, 1.0, False, 0), (0.3, 1.0, True, 1), (0.5, 1.0, False, 1), (0.3, 0.4, False, 1),
+@pytest.mark.parametrize(("peak", "pause", "turn", "stated", "contacts"), [
+    (0.3, 1.0, 20.5, False, 0), (0.3, 1.0, 20.5, True, 1), (0.5, 1.0, 20.5, False, 1), (0.3, 0.4, 20.5, False, 1),
+    (0.3, 1.0, 22.0, False, 1),
 ])  # fmt: skip
-def test_what_static_friction_explains_while_a_joint_hardly_moves_is_no_contact(peak, pause, stated, contacts):
-    """An effort from 20.2 to 20.8 s counts above a friction of 0.4, where the joint moves, or in a stated window."""
+def test_what_static_friction_explains_while_a_joint_slowly_reverses_is_no_contact(peak, pause, turn, stated, contacts):
+    """An effort at 20.2 to 20.8 s counts above a friction of 0.4, if the joint moves or creeps, or if it is stated."""
     effort = noise(std=0.01) + np.where((T >= 20.2) & (T <= 20.8), peak, 0.0)
     quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.1, 0.01, "c", 1, 0.95, 0.01, 0.2)]
-    dq = np.where(np.abs(T - 20.5) <= 0.5 * pause, 0.001, 1.0)
+    dq = np.where(np.abs(T - 20.5) <= 0.5 * pause, 0.001, 1.0) * np.sign(turn - T)
     about = entry(role="contact", contact=((20.2, 20.8),) if stated else ())
     records = measured(track(effort, std=0.01, dq=dq, static_friction=0.4), quiet, about)
     assert len([record for record in records if isinstance(record, Contact)]) == contacts

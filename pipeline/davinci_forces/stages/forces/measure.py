@@ -29,7 +29,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     """Measure the contacts of one joint: in windows that the study states, and others above the alarm level.
 
     At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
-    Outside the windows, what static friction explains while the joint hardly moves is noted, and is no contact.
+    Outside the windows, what static friction explains while the joint slowly reverses is noted, and is no contact.
     In the last moments of a log the smoother has no later samples, so no contact begins there.
     A window on a joint at rest counts only if a contact was detected in it.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
@@ -158,9 +158,13 @@ def unknown_friction(track: Track) -> Array:
 
 
 def is_friction(track: Track, window: Window) -> bool:
-    """Whether static friction explains the effort in a window: the joint sticks throughout, and the effort is less."""
-    slow, inside = np.abs(track.dq) <= SLOW * np.sqrt(np.mean(track.dq**2)), ~is_outside(track.t, [window])
-    return bool(np.all(slow[inside])) and largest_effort(track, window) <= track.static_friction
+    """Whether static friction explains the effort in a window: it is larger, and the joint may stick as it reverses.
+
+    A joint that creeps in one direction slides, so its friction is known.
+    """
+    dq, slow = track.dq[~is_outside(track.t, [window])], SLOW * np.sqrt(np.mean(track.dq**2))
+    sticks = len(dq) > 0 and -slow <= dq.min() <= 0.0 <= dq.max() <= slow
+    return bool(sticks) and largest_effort(track, window) <= track.static_friction
 
 
 def largest_effort(track: Track, window: Window) -> float:
@@ -175,8 +179,8 @@ def friction_note(track: Track, windows: Sequence[Window], robot: Robot) -> Diag
     largest = max(largest_effort(track, window) for window in windows)
     text = (
         f"{track.log}/{track.joint}: an effort {first} of up to {largest:.2g} {unit} does not count as a contact: the "
-        f"joint hardly moves, so static friction may be the cause (up to {track.static_friction:.2g} {unit}); state a "
-        "window of contact in study.toml if something touched the arm"
+        f"joint reverses so slowly that static friction may be the cause (up to {track.static_friction:.2g} {unit}); "
+        "state a window of contact in study.toml if something touched the arm"
     )
     return diagnostic("measure", f"{track.log}.{track.joint}.friction", "note", text)
 
