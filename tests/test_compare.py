@@ -67,6 +67,24 @@ def test_text_and_truth_are_compared_as_they_are_and_nan_is_nan():
     assert changed(StatedValue(1.0, 5.0), StatedValue(math.inf, 5.0))
 
 
+def test_contacts_are_paired_by_their_times_whatever_their_numbers():
+    def numbers(*windows: tuple[float, float, float]) -> dict[str, StatedValue]:
+        names = ("onset", "release", "peak")
+        rows = [(f"contact.a.roll.{n}", window) for n, window in enumerate(windows, 1)]
+        return {f"{key}.{name}": StatedValue(x, 0.1) for key, row in rows for name, x in zip(names, row, strict=True)}
+
+    false_one, small, large = (2.0, 3.0, 0.3), (5.0, 6.0, 1.0), (8.0, 9.5, 4.0)
+    gone = changes(numbers(false_one, small, large), numbers(small, (8.05, 9.5, 5.0)))
+    assert [(c.key, c.after and c.after.value) for c in gone] == [
+        *((f"contact.a.roll.1.{name}", None) for name in ("onset", "release", "peak")),
+        ("contact.a.roll.3.peak", 5.0),
+    ]
+    push = {"tissue.a.1.onset": StatedValue(1.0, 0.1), "tissue.a.1.k_t": StatedValue(9.0, 0.1)}  # it has no release
+    assert not changes(push, push)
+    came = changes(numbers(small, large), numbers(false_one, small, large))
+    assert [(c.key, c.before) for c in came] == [(f"contact.a.roll.1.{n}", None) for n in ("onset", "release", "peak")]
+
+
 def test_another_unit_is_a_change():
     assert changed(StatedValue(1.0, 0.1, "N m"), StatedValue(1.0, 0.1, "A"))
 

@@ -83,7 +83,7 @@ class TipContact(LogRecord):
     The windows that the study states come first, then other contacts detected on any joint.
     """
 
-    PUBLISHED = ("tip.{log}.{row}: f_x± f_y± f_z± peak=f_peak± sigma_1± sigma_2± sigma_3±",)
+    PUBLISHED = ("tip.{log}.{row}: onset release f_x± f_y± f_z± peak=f_peak± sigma_1± sigma_2± sigma_3±",)
 
     filter: str
     stated: Counts

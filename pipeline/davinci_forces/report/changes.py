@@ -18,6 +18,7 @@ SIGMAS = 2.0  # standard errors of a difference, beyond which a number has chang
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
 
 Value = float | int | str | bool | None
+Window = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -80,10 +81,31 @@ class Change:
 
 
 def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue]) -> list[Change]:
-    """Every key that changed, went or came, in the order of the files."""
-    both = [Change(key, a, after.get(key)) for key, a in before.items()]
-    came = [Change(key, None, b) for key, b in after.items() if key not in before]
+    """Every key that changed, went or came, in the order of the files; contacts are paired by their times."""
+    contacts = partners(windows_of(before), windows_of(after))
+    starts = {key: key.rpartition(".")[0] for key in before}
+    keys = {key: key.replace(start, contacts.get(start, start), 1) for key, start in starts.items()}
+    both = [Change(key, a, after.get(keys[key])) for key, a in before.items()]
+    new = after.keys() - keys.values()
+    came = [Change(key, None, b) for key, b in after.items() if key in new]
     return [d for d in (*both, *came) if d.before is None or d.after is None or has_changed(d.before, d.after)]
+
+
+def partners(before: Mapping[str, Window], after: Mapping[str, Window]) -> dict[str, str]:
+    """The window of `after` that shares most time with each of `before`, of the same log and joint; "" for none."""
+    pairs = {}
+    for name, (onset, release) in before.items():
+        others = {other: w for other, w in after.items() if other.rpartition(".")[0] == name.rpartition(".")[0]}
+        shared = {other: min(release, end) - max(onset, start) for other, (start, end) in others.items()}
+        pairs[name] = max((other for other in shared if shared[other] > 0.0), key=shared.__getitem__, default="")
+    return pairs
+
+
+def windows_of(numbers: Mapping[str, StatedValue]) -> dict[str, Window]:
+    """Onset and release [s] of every contact, by the start of its keys."""
+    names = [key.removesuffix(".release") for key in numbers if key.endswith(".release")]
+    onset, release = ([numbers[f"{name}.{which}"].number or 0.0 for name in names] for which in ("onset", "release"))
+    return dict(zip(names, zip(onset, release, strict=True), strict=True))
 
 
 def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:
