@@ -310,6 +310,19 @@ def test_results_are_the_smoothers_and_the_filters_stand_beside_them():
     assert contact.peak_std[0] == pytest.approx(0.1)
 
 
+def test_free_windows_of_a_contact_log_give_its_levels_and_what_is_between_them_does_not():
+    """The push would raise every level; without windows nobody knows where it is."""
+    pushed = track(slow_noise(0.05) + np.where((T >= 20) & (T <= 22), 2.0, 0.0))
+    assert not list(assess.run(pushed, entry(role="contact"), arm.ARM))
+    smoothed, _ = assess.run(pushed, entry(role="contact", free=((25.0, 38.0), (2.0, 18.0))), arm.ARM)
+    assert (smoothed.log, smoothed.free_rms) == ("push", pytest.approx(0.05, rel=0.3))
+    inside = ((T >= 3) & (T <= 17)) | ((T >= 26) & (T <= 37))
+    assert smoothed.tested == pytest.approx(inside.sum(), abs=4)
+    stated = entry(role="contact", contact=((20.0, 22.0),), free=((2.0, 5.0),))
+    assert stated.possible_contact == stated.contact
+    assert entry(role="validation", free=((2.0, 5.0),)).possible_contact == ()
+
+
 def test_coverage_by_quartile_of_speed_leaves_standstill_out():
     """A band that is half as wide in fast motion covers 67 % there; samples at rest count in no quartile."""
     moves = T < 30

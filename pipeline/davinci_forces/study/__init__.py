@@ -94,7 +94,17 @@ class LogEntry:
     @property
     def has_known_free_motion(self) -> bool:
         """Whether the log has samples that are known to be free of contact."""
-        return self.role in ("identification", "validation") or (self.role == "contact" and bool(self.contact))
+        return self.role in ("identification", "validation") or (
+            self.role == "contact" and bool(self.contact or self.free)
+        )
+
+    @property
+    def possible_contact(self) -> tuple[tuple[float, float], ...]:
+        """The windows [s] of contact; where a contact log states none but free ones, the time between these."""
+        if self.role != "contact" or self.contact or not self.free:
+            return self.contact
+        edges = (-math.inf, *(edge for window in sorted(self.free) for edge in window), math.inf)
+        return tuple(zip(edges[::2], edges[1::2], strict=True))
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     if track.at_rest or not entry.has_known_free_motion:
         return
     smoothed, filtered = (
-        which(track.t, entry.contact, track.rate, track.unscored) for which in (free_smoothed, free_space)
+        which(track.t, entry.possible_contact, track.rate, track.unscored) for which in (free_smoothed, free_space)
     )
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)

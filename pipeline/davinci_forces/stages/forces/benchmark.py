@@ -37,7 +37,7 @@ def run(
 
     Each filter has the smallest random walk with which it follows a push, so that all are compared at equal speed.
     """
-    free = free_space(model.t, entry.contact, model.rate, model.unscored)
+    free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     unfitted = entry.role != "identification" and entry.has_known_free_motion
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return

@@ -30,7 +30,7 @@ def run(
     """
     if not entry.has_known_free_motion or model.at_rest or noise is None or not model.scheme:
         return
-    free = free_smoothed(model.t, entry.contact, model.rate, model.unscored)
+    free = free_smoothed(model.t, entry.possible_contact, model.rate, model.unscored)
     if int(free.sum()) < MIN_SAMPLES_BAND:
         return
     filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)

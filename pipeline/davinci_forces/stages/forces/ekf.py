@@ -48,7 +48,8 @@ def track_effort(
             return
     if offset.drifts:
         yield drift_warning(model, offset)
-    numbers = numbers_of(estimate, offset, converged, free_space(model.t, entry.contact, model.rate, model.unscored))
+    free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
+    numbers = numbers_of(estimate, offset, converged, free)
     blocks = gather_blocks(filter_blocks(DEFAULT, parts, noise)) if is_long else [(slice(0, len(model)), estimate)]
     del estimate
     smoothed, own = filter_parts(SMOOTHER, parts, noise, ("tau_ext", "tau_ext_std"))[2:4]

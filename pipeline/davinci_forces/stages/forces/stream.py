@@ -84,7 +84,7 @@ def compare(
     track: Track, tau_ext: Array, found: Contact | None, entry: LogEntry, late: float, delay: float
 ) -> Iterator[Streamed]:
     """Compare the streamed external effort (N,) of a joint in free motion and in contacts with the smoother's."""
-    free = free_space(track.t, entry.contact, track.rate, track.unscored)
+    free = free_space(track.t, entry.possible_contact, track.rate, track.unscored)
     if int(free.sum()) < MIN_SAMPLES:
         return
     statistics = free_motion_statistics(tau_ext, free, track.rate)

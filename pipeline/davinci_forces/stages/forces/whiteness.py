@@ -129,7 +129,7 @@ def apply(
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
     for model, noise, delay in zip(models, filter_noises, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
-        free = is_outside(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)])
+        free = is_outside(model.t, [*entry.possible_contact, *spans(model.t, model.unscored > 0)])
         yield from innovation_records(model, results.pop(0))
         first = slice(MAX_SAMPLES_SEARCH)
         moving = is_far_from_reversals(velocities(model)[0], 1.0 / model.rate)[first]
@@ -198,7 +198,7 @@ def innovation_records(model: JointModel, result: Innovations) -> Iterator[Innov
 
 def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
     """The result of a search for the causes of innovations that are not white, trial by trial."""
-    trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.contact
+    trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.possible_contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
     return Explanation(
         log=model.log,

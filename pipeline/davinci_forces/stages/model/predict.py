@@ -76,9 +76,9 @@ def predict_joint(
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
     scored = is_scored(motion, along, chosen, entry)
-    free = scored & is_outside(motion.t, entry.contact)
+    free = scored & is_outside(motion.t, entry.possible_contact)
     if not free.any():
-        message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
+        message = f"{name}: contact and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
     if steps := spans(motion.t, ~scored & is_evaluated(motion)):
@@ -172,7 +172,8 @@ def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry
     moves = is_evaluated(motion)
     if fit is None or entry.role not in ("validation", "contact") or not entry.has_known_free_motion:
         return moves
-    free = moves & is_outside(motion.t, entry.contact) & (np.diff(motion.segment, prepend=motion.segment[:1]) == 0)
+    unbroken = np.diff(motion.segment, prepend=motion.segment[:1]) == 0
+    free = moves & is_outside(motion.t, entry.possible_contact) & unbroken
     friction = 2.0 * along.identified.static_friction(fit, motion.joint)
     slack = np.where(is_far_from_reversals(motion.dq, 1.0 / motion.rate), 0.0, friction)
     residual = motion.tau - along.tau_hat(fit, motion.joint)

@@ -108,7 +108,7 @@ def apply(
 
 def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
     """Whether all joints move in free space at each sample (N,), for the smoother."""
-    free = [free_smoothed(track.t, entry.contact, track.rate, track.unscored) for track in tracks]
+    free = [free_smoothed(track.t, entry.possible_contact, track.rate, track.unscored) for track in tracks]
     return np.asarray(np.all(free, axis=0))
 
 
