@@ -245,16 +245,18 @@ def identified():
     return fits, list(tune.gather(list(tune.run(model, noise, lowpass=17.0, delay=0.1)), delay=0.1))
 
 
-def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
-    """A sign is one of its causes, and which it is nobody but the fit can tell."""
+def test_a_negative_friction_beside_an_inertia_that_is_not_positive_tells_that_a_sign_is_wrong():
     signal = arm.signal()
     backward = replace(signal, tau=-signal.tau)
     made = list(fit.run([trajectory(backward)], [], arm.ARM, lowpass=17.0))
     fits = [r for r in made if isinstance(r, Fit)]
     (text,) = [text for diagnostic in arm.models([signal], fits) for text in diagnostic.text]
     assert "the inertia of independent.lse is not positive" in text
-    assert "the report may name the cause beside all fits of hand_roll" in text
+    assert "its friction is negative, too: correct the `sign`" in text
     assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
+    light = [replace(f, theta=np.where(f.parameter == "inertia", -0.1, -f.theta)) for f in fits]
+    (other,) = [text for diagnostic in arm.models([signal], light) for text in diagnostic.text]
+    assert "the report may name the cause beside all fits of hand_roll" in other
 
 
 def tracked(identified, signal, bands=(), **changes):

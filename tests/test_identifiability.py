@@ -121,6 +121,7 @@ def test_an_effort_against_the_motion_is_blamed_on_a_sign():
     said = blamed([-0.45, 0.01, -0.37, -0.22], [0.01] * 4)
     assert "and friction is negative, too" in said
     assert "correct the `sign`" in said
+    assert "correct the `sign`" in blamed([-0.07, 0.01, -0.37, -0.22], [0.25, 0.01, 0.01, 0.01])  # hardly excited, too
 
 
 def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_out():

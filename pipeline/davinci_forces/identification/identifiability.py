@@ -68,23 +68,23 @@ def why_not_positive(
 ) -> str:
     """Explain from its fit why an inertia is not positive; `others` are joints that move in the same logs.
 
-    If the estimate is not significantly negative, the motion hardly excites the inertia.  If friction is negative, too,
-    a sign is wrong.  Otherwise the model lacks a term.
+    If friction is negative, too, a sign is wrong.  Otherwise, if the estimate is not significantly negative, the motion
+    hardly excites the inertia; if it is, the model lacks a term.
     """
     inertia_coefficients = np.array([term.a for term in joint.terms])  # term.a is the coefficient of the acceleration
     value = float(inertia_coefficients @ estimate.theta)
     std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, inertia_coefficients)
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
     omitted = f"; this model leaves out the effects of {join_names(others)} in the same logs" if others else ""
-    if value > -MIN_Z * std:
-        text = f"{inertia} cannot be distinguished from 0, because the motion hardly excites it{omitted}"
-        by_itself = "by itself, " if others else ""
-        return f"{text}; record the joint {by_itself}with larger accelerations: {excite_command(robot, joint.name)}"
     friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
     negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and negative_friction.sum() * 2 >= friction.sum():
         text = f"{inertia}, and friction is negative, too: the effort opposes the motion"
         return f"{text}; correct the `sign` of the effort or of the position"
+    if value > -MIN_Z * std:
+        text = f"{inertia} cannot be distinguished from 0, because the motion hardly excites it{omitted}"
+        by_itself = "by itself, " if others else ""
+        return f"{text}; record the joint {by_itself}with larger accelerations: {excite_command(robot, joint.name)}"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
         return f"{text}{omitted}; record the joint by itself: {excite_command(robot, joint.name)}"

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from davinci_forces.errors import PipelineError
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
 from davinci_forces.maths.periods.shift import likeness
@@ -43,15 +44,19 @@ class Identified:
         i = self.model(fit).efforts.index(joint)
         return fit.cutoff[i], fit.effort_lag[i]
 
-    def static_friction(self, fit: Fit, joint: str) -> float:
-        """Return the largest friction of a joint at standstill: its friction parameters that are efforts, unsigned."""
+    def friction_efforts(self, fit: Fit, joint: str) -> Array:
+        """Return the friction parameters of a joint that are efforts."""
         suffix = f" of {joint}" if len(self.model(fit).efforts) > 1 else ""
         effort = self.robot.joint(joint).unit("{effort}")
         is_friction = [
             "friction" in name and name.endswith(suffix) and unit == effort
             for name, unit in zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
         ]
-        return float(np.abs(fit.theta[is_friction]).sum())
+        return np.asarray(fit.theta[is_friction])
+
+    def static_friction(self, fit: Fit, joint: str) -> float:
+        """Return the largest friction of a joint at standstill: its friction parameters that are efforts, unsigned."""
+        return float(np.abs(self.friction_efforts(fit, joint)).sum())
 
     def fits_of(self, joint: str) -> list[Fit]:
         """Return the fits of a joint's effort: its own, and those of its arm."""

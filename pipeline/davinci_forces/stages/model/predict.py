@@ -133,7 +133,7 @@ def apply(
         path = SAME_PATH if is_fitted else identified.path(motion)
         terms = along.fields_of(joint_fit, motion.joint)
         if terms["inertia"].min() <= 0:
-            yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit))
+            yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit, identified))
             continue
         refit = refits.get(motion.joint)
         model = JointModel.like(
@@ -192,11 +192,13 @@ def step_warning(name: str, start: float, end: float) -> str:
     return f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}; leave them out by `skip` and `until`"
 
 
-def inertia_warning(motion: Motion, fit: Fit) -> str:
+def inertia_warning(motion: Motion, fit: Fit, identified: Identified) -> str:
     """State why the external effort of a joint is not estimated."""
+    name, model = f"{motion.log}/{motion.joint}", f"{fit.model}.{fit.estimator}"
+    text = f"{name}: the inertia of {model} is not positive along this log, so its external effort is not estimated"
+    if identified.friction_efforts(fit, motion.joint).sum() < 0.0:
+        return f"{text}; its friction is negative, too: correct the `sign` of its effort or of its position"
     return (
-        f"{motion.log}/{motion.joint}: the inertia of {fit.model}.{fit.estimator} is not positive along this log, so "
-        f"its external effort is not estimated; the report may name the cause beside all fits of {motion.joint}: a "
-        "motion that hardly excites it, a wrong sign, other joints that move in the same logs, or terms that the model "
-        "lacks"
+        f"{text}; the report may name the cause beside all fits of {motion.joint}: a motion that hardly excites it, a "
+        "wrong sign, other joints that move in the same logs, or terms that the model lacks"
     )
