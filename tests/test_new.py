@@ -134,6 +134,15 @@ def test_the_number_in_a_name_tells_the_joint(tmp_path, names, first):
             assert held(tmp_path)[f"joint_{k + 1}.{symbol}"] == name.format(first + k)
 
 
+def test_a_position_of_which_no_word_names_a_joint_is_in_the_table_and_wanted_and_time_are_not(tmp_path):
+    t, q, dq = motion(2)
+    names = [f"{joint} {quantity}" for quantity in ("position", "torque") for joint in ("Roll", "Swivel")]
+    header = ",".join(["Time", *names, "Roll position setpoint"])
+    said = new(table(tmp_path / "run.csv", t, 0.2 * q, effort(q, dq), 0.2 * q[:, :1], header=header))
+    assert [line.count("joint of Swivel position") for line in said.splitlines() if "run.csv" in line] == [1]
+    assert said.count("joint of") == 1
+
+
 def test_words_in_brackets_tell_the_joint_by_their_order_and_what_was_wanted_is_left_out(tmp_path):
     t, q, dq = motion(2)
     header = "t,position[pan],position[lift],setpoint_effort[pan],setpoint_effort[lift],effort[pan],effort[lift]"

@@ -29,7 +29,7 @@ from davinci_forces.study.belonging import (
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, force_sensor, is_tissue, tissue_channels, unit_of
 from davinci_forces.study.entries import ROLES, is_inside
 from davinci_forces.study.guessing import Holding, Meaning, guess
-from davinci_forces.study.names import is_time, stated_unit
+from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
@@ -302,6 +302,9 @@ class _Writer:
         joints, holding = self.robot.joints, self.draft.guess
         lacking = {m.joint for m in holding.meanings.values()} - {*holding.joints_of_ranges()}
         yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
+        if holding.robot and len({m.joint for m in holding.meanings.values()}) < len(joints):
+            names = [c.name for c in self.draft.log.channels if c.kind == "number" and c.name not in holding.meanings]
+            yield from (f"joint of {name}" for name in names if symbol_of(words_of(name)) == "q")
         if self.role.role == "weight":
             yield "weight = ... is missing: without it no mass is estimated"
 
@@ -328,7 +331,7 @@ class _Writer:
 
     def _contact(self) -> str:
         if not self.draft.touching:
-            return "# contact = [[12.0, 14.5]]  # [s] known contact windows"
+            return "# contact = [[12.0, 14.5]]  # [s] windows of contact; or, without contact, free = [[0.0, 5.0]]"
         if reason := _touches_throughout(self.draft):
             return f'contact = "all"  # {reason}'
         return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'
