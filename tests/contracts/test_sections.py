@@ -64,6 +64,9 @@ from davinci_forces.report.sections import (
 from davinci_forces.report.sections import (
     baseline as baseline_section,
 )
+from davinci_forces.report.sections import (
+    contacts as contacts_section,
+)
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study.review import Rating
@@ -347,16 +350,55 @@ def test_remarks_that_differ_in_their_log_and_their_numbers_alone_take_one_place
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):
     found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
     about = context(lab, catalogue)
-    said = summary.opening_paragraph(about, [], found)
+    said = summary.opening_paragraph(about, found)
     assert f"**{sum(map(len, found))} contacts found above the alarm level; the study states none. Largest: " in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
     windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
-    assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, [], ones)
+    assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, ones)
     about = context(lab, without(catalogue, Contact))
-    assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(
-        about, [], []
-    )
+    assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(about, [])
+
+
+def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, catalogue: Catalogue):
+    known = context(lab, catalogue)
+    logs = tuple(replace(log, contact=(), free=()) if log.role == "contact" else log for log in known.study.logs)
+    unknown = replace(known, study=replace(known.study, logs=logs))
+    found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
+    doubt = "** Small ones may be errors of the model: see [@contacts]."  # a reference in bold text is not one
+    for about, doubted in ((known, False), (unknown, True)):
+        assert (doubt in summary.opening_paragraph(about, found)) == doubted
+        notes = [block.text for block in walk(written("contacts", about)) if isinstance(block, Prose)]
+        assert any("State windows without contact, `free = " in note for note in notes) == doubted
+
+
+def test_a_joint_without_efforts_is_not_counted_and_not_sent_to_record_what_it_has(lab: Lab, catalogue: Catalogue):
+    def tracks(joints: set[str]) -> Catalogue:
+        return Catalogue(lambda kind: [r for r in catalogue.records(kind) if kind is not Track or r.joint in joints])
+
+    about = context(lab, tracks({"hand_roll"}))
+    assert "It was estimated on 1 joint of" in summary.opening_paragraph(about, [])
+    [entry, *_] = [log for log in about.study.logs if log.role == "contact"]
+    assert "record an identification log" in contacts_section.reason(entry, None, False)
+    assert contacts_section.reason(entry, None, True).startswith("its external effort is not estimated")
+
+
+def test_a_warning_that_no_effort_is_estimated_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
+    text = "push/hand_roll: the inertia is not positive, so its external effort is not estimated"
+    lost = diagnostic("predict", "push.hand_roll.model", "warning", text)
+    about = context(lab, Catalogue(lambda kind: [*catalogue.records(kind), *([lost] if kind is Diagnostic else [])]))
+    assert summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])[0] == text
+
+
+def test_the_value_of_a_peak_is_left_out_beside_a_larger_one(lab: Lab, catalogue: Catalogue):
+    track = next(t for t in catalogue.records(Track) if t.log == "push")
+    contact = next(c for c in catalogue.records(Contact) if (c.log, c.joint) == (track.log, track.joint))
+    start, width = track.t[0], track.t[-1] - track.t[0]
+    onset = start + width * np.array([0.3, 0.35, 0.7])
+    values = {name: np.zeros(3) for name in type(contact).columns()}
+    values |= {"found": np.ones(3), "onset": onset, "release": onset + 0.01 * width, "peak": np.array([1.0, -2.0, 0.5])}
+    shown = summary.named_peaks(track, replace(contact, **values))
+    assert shown.names == ("", "-2", "+0.5")
 
 
 @pytest.mark.parametrize("worst", ["push", "tip"])

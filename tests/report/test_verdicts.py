@@ -51,6 +51,7 @@ def test_the_path_that_was_fitted_is_never_good_and_does_not_excuse_a_problem():
 def test_what_is_not_known_calls_for_caution():
     assert Trust("roll", None, None, None).level == "warn"
     assert Trust("roll", None, None, 1.0).level == "warn"
+    assert replace(trust(error=0.01), space=None).level == "warn"  # it has no effort that could be good
     assert replace(trust(), prediction=prediction(effort_rms=0.0)).level == "warn"
     assert grade(float("nan"), 0.1, 0.2) == "warn"
 
@@ -113,7 +114,7 @@ def by_log(log="one", error=0.2):
 
 def level_of(predictions, shares):
     run, about = decisive(predictions, shares)
-    return Trust("roll", run, None, None, about)
+    return Trust("roll", run, free_space(), None, about)
 
 
 def test_a_whole_log_left_out_decides_and_not_its_blocks_of_path():
@@ -219,7 +220,7 @@ def test_a_numbered_joint_has_no_article_in_a_sentence():
 
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
-    assert "all 95 % bands are wide enough" not in verdict_sentence(None, [unjudged])
+    assert verdict_sentence(None, [unjudged]) == "No effort was estimated in free space on the roll."
     assert "in free motion all 95 % bands are wide enough" in verdict_sentence(
         None, [replace(unjudged, space=free_space(coverage=0.95))]
     )

@@ -73,10 +73,11 @@ class Trust:
     def level(self) -> Level:
         """The verdict by the effort sought if one is stated, else by the model error.
 
-        It is never good on the same path.  A joint at rest is neither good nor a problem.
+        It is never good on the same path, or without an effort in free space.  A joint at rest is neither good nor a
+        problem.
         """
         by = grade(self.fineness, DETECTED, DETECTABLE) if self.sought else grade(self.share, GOOD, CAUTION)
-        return "warn" if self.at_rest or (by == "good" and self.same_path) else by
+        return "warn" if self.at_rest or (by == "good" and (self.same_path or self.space is None)) else by
 
     @property
     def narrow(self) -> bool:

@@ -44,6 +44,13 @@ def section(context: Context) -> Iterator[Block]:
         header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
         every = tuple(row for contact in contacts for row in rows(context, contact))
         yield Table(caption, header, every, "contact-table", "llrrrrrrl", largest(contacts))
+        logs = dict.fromkeys(contact.log for contact in contacts)
+        if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
+            yield Prose(
+                f"**{', '.join(unknown)}**: where nothing touched the arm is not stated, so the levels do not know its "
+                "path. A small contact that comes back with the period, or at reversals, is an error of the model. "
+                "State windows without contact, `free = [[start, end], ...]`, and the levels hold for this path, too."
+            )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
         columns = ("Log", "Joint", "Reason, and remedy")
@@ -116,6 +123,7 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     measured = {(contact.log, contact.joint) for contact in context.catalogue.records(Contact)}
     weighed = {weight.log for weight in context.catalogue.records(Weight)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.records(Track)}
+    fitted = {fit.group for fit in context.own_fits()}
     palpated = {tissue.log for tissue in context.catalogue.records(Stiffness)}
     for entry in context.study.logs:
         if entry.role not in ("contact", "weight", "tissue", "friction") or entry.name in weighed | palpated:
@@ -123,16 +131,19 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
         reasons: dict[str, list[str]] = {}
         for joint in entry.joints:
             if (entry.name, joint) not in measured:
-                reasons.setdefault(reason(entry, tracked.get((entry.name, joint))), []).append(title(joint))
+                why = reason(entry, tracked.get((entry.name, joint)), joint in fitted)
+                reasons.setdefault(why, []).append(title(joint))
         yield from ((entry.name, ", ".join(names), why) for why, names in reasons.items())
 
 
-def reason(entry: LogEntry, track: Track | None) -> str:
+def reason(entry: LogEntry, track: Track | None, is_fitted: bool) -> str:
     """The reason why no contact was measured on a joint of a log."""
     if entry.role == "friction":
         return "a friction log gives friction maps; its external effort is not tracked"
     if entry.role == "weight" and entry.weight is None:
         return "its mass is not estimated; write weight = { moves_with = ..., position = ... } in study.toml"
+    if track is None and is_fitted:
+        return "its external effort is not estimated; the warnings of `davinci-forces all` say why"
     if track is None:
         return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:

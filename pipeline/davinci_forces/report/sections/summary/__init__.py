@@ -45,7 +45,9 @@ from davinci_forces.report.verdicts import (
 from davinci_forces.robots.robot import Kind
 
 SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
-FIRST_OF_ALL = 100.0  # weight of such a warning
+NOT_ESTIMATED = "its external effort is not estimated"  # in a warning that leaves a joint without an answer
+FIRST_OF_ALL = 100.0  # weight of such warnings
+WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -70,7 +72,7 @@ def blocks(context: Context) -> Iterator[Block]:
         yield sign_off(context)
         return
     contacts = context.catalogue.records(Contact)
-    yield Prose(opening_paragraph(context, trusts, contacts))
+    yield Prose(opening_paragraph(context, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
         # What is left on page one beside the table and lines of results.
@@ -117,15 +119,15 @@ def fitted_joints(context: Context) -> list[str]:
     return list(dict.fromkeys(fit.group for fit in context.own_fits()))
 
 
-def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
+def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
-    logs = len({track.log for track in context.catalogue.records(Track)})
+    logs, joints = ({getattr(track, about) for track in context.catalogue.records(Track)} for about in ("log", "joint"))
     stated = sum(int(contact.stated.sum()) for contact in contacts)
     above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
     unstated = count(sum(len(contact) for contact in contacts) - stated, "contact")
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
-        f"on {count(len(trusts), 'joint')} of the {literal(context.study.robot.title)}, in {logs} of "
+        f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
         f"{count(len(context.study.logs), 'log')}. "
         f"{logs_in_words(context)}"
     )
@@ -135,7 +137,9 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
         return f"{text} No contact is measured: {why}."
     peaks = largest_peaks(context, contacts)
     if not stated:
-        return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
+        known = all(context.study.log(contact.log).has_known_free_motion for contact in contacts)
+        doubt = "" if known else " Small ones may be errors of the model: see [@contacts]."
+        return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**{doubt}"
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
     )
@@ -198,13 +202,15 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 
 def named_peaks(track: Track, contact: Contact) -> Points:
-    """The peak of each contact that was found, with its value."""
+    """The peak of each contact that was found, with its value unless a larger one is close by."""
     places, rows = [], contact.found > 0
     for start, end in zip(contact.onset[rows], contact.release[rows], strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
-    names = tuple(f"{p:+.3g}" for p in contact.peak[rows])
-    return Points(track.t[places], track.tau_ext_smooth[places], "", "black", names=names)
+    t, sizes, width = track.t[places], np.abs(contact.peak[rows]), WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
+    covered = [(sizes[np.abs(t - at) < width] > size).any() for at, size in zip(t, sizes, strict=True)]
+    names = tuple("" if near else f"{p:+.3g}" for near, p in zip(covered, contact.peak[rows], strict=True))
+    return Points(t, track.tau_ext_smooth[places], "", "black", names=names)
 
 
 def spoken(contact: Contact) -> str:
@@ -268,7 +274,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         if severity == "warning"
     )
     for stage, text in first_of_each_kind(warnings):
-        yield FIRST_OF_ALL if stage in SPOILS_ALL else 1.5, literal(text.replace("`", ""))
+        yield FIRST_OF_ALL if stage in SPOILS_ALL or NOT_ESTIMATED in text else 1.5, literal(text.replace("`", ""))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
@@ -290,7 +296,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         if is_mostly_constant(p):
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
             left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
-            constant = f"; {left} without its constant part, {mean}, as of another payload"
+            constant = f"; {left} without its constant part, {mean}, as of another payload or an offset of the current"
         text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"

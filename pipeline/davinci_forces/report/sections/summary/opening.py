@@ -35,14 +35,16 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         if t.space is not None
     ]
     parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
-    parts += errors([trusted for trusted in trusts if trusted not in fine])
-    narrow = [name_in_sentence(t.joint) for t in trusts if t.narrow and t.level != "good"]  # `errors` names the good
-    narrow[1:] = [name.removeprefix("the ") for name in narrow[1:]]
-    which = as_list(narrow) if len(narrow) <= MAX_NAMED else f"{len(narrow)} of {len(trusts)} joints"
-    parts += [f"the 95 % band is too narrow on {which}"] if narrow else []
+    parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
+    narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `errors` names the good
+    unseen = [t for t in trusts if t.space is None]
+    for why, some in (("the 95 % band is too narrow", narrow), ("no effort was estimated in free space", unseen)):
+        names = [name_in_sentence(t.joint).removeprefix("the " if i else "") for i, t in enumerate(some)]
+        which = as_list(names) if len(names) <= MAX_NAMED else f"{len(names)} of {len(trusts)} joints"
+        parts += [f"{why} on {which}"] if names else []
     if any(trusted.space is not None for trusted in trusts) and not any(trusted.narrow for trusted in trusts):
         parts += ["in free motion all 95 % bands are wide enough"]
-    text = "; ".join(parts) or "no effort was estimated in free space"
+    text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
 
