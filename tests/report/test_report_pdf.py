@@ -179,10 +179,7 @@ def test_no_number_breaks_where_words_have_to() -> None:
     """As on page one, if a joint has a long name and its numbers a power of ten and a unit of two letters."""
     numbers = [Number(4.38e-6 * 10**i, unit, 4.5e-7) for i, unit in enumerate(("N m", "N"))]
     cells = ("100 %", "14 %", "82 %, too narrow", "0.8016 ± 0.0052", "0.8343")
-    rows = tuple(
-        ("shoulder_lift_joint", "Small error, narrow band, at rest", *cells, number, number, number)
-        for number in numbers
-    )
+    rows = tuple(("shoulder_lift_joint", "Narrow band, at rest", *cells, number, number, number) for number in numbers)
     header = ("Joint", "Verdict", "New path", "Error", "Coverage", "R2", "Ceiling", "Model error", "Level", "Sought")
     table = Table("Trust.", header, rows, align="ll" + "r" * 8)
     text = read(pdf.render(one(table))).replace("\N{NO-BREAK SPACE}", " ")

@@ -185,7 +185,7 @@ def log_remarks(summary: LogSummary) -> list[str]:
 def verdict_words(level: Level, same_path: bool, narrow: bool) -> str:
     """A verdict with its limitation; the word "Good" is not printed with a band that is too narrow."""
     if level == "good" and narrow:
-        return "▲\N{NO-BREAK SPACE}Small error, narrow band"
+        return "▲\N{NO-BREAK SPACE}Narrow band"
     return WORDS[level] + (", same path" if same_path else "")
 
 

@@ -94,9 +94,7 @@ class LogEntry:
     @property
     def has_known_free_motion(self) -> bool:
         """Whether the log has samples that are known to be free of contact."""
-        return self.role in ("identification", "validation") or (
-            self.role == "contact" and bool(self.contact or self.free)
-        )
+        return self.role in ("identification", "validation") or (self.role == "contact" and self.possible_contact != ())
 
     @property
     def possible_contact(self) -> tuple[tuple[float, float], ...]:
