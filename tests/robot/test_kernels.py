@@ -48,17 +48,19 @@ def test_many_samples_have_the_mass_matrices_that_few_have(n, compiled):
     np.testing.assert_allclose(many, few, rtol=0, atol=1e-13)
 
 
-@SIZES
-def test_many_samples_have_the_regressors_that_few_have(n, compiled):
-    few, many = compiled(lambda: rigid_body.regressor(CHAIN, *motions(n)))
-    np.testing.assert_allclose(many, few, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("samples", [1, 2, kernels.LANES - 1, kernels.LANES, kernels.LANES + 1])
-def test_the_kernels_give_the_regressors_of_ever_so_few_samples(samples):
-    motion = motions(3)[:, :samples]
+@pytest.mark.parametrize("n", [3, 6, 7])
+@pytest.mark.parametrize("samples", [1, 2, kernels.LANES - 1, kernels.LANES, kernels.LANES + 1, N])
+def test_the_kernels_give_the_regressors_of_few_samples_and_of_many(samples, n):
+    motion = motions(n)[:, :samples]
     expected = rigid_body.regressor(CHAIN, *motion)
     np.testing.assert_allclose(rigid_body.compiled_regressor(CHAIN, *motion), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("rows", "L"), [((0,), 5), ((1, 2), 9), ((2, 0), 2), ((1,), 0)])
+def test_some_efforts_of_the_first_links_are_those_of_the_whole_regressor(rows, L):
+    whole = rigid_body.regressor(CHAIN, *motions(3))
+    part = rigid_body.regressor(CHAIN, *motions(3), rows, L)
+    np.testing.assert_array_equal(part, whole[:, list(rows), : 10 * L])
 
 
 def test_many_samples_have_the_coriolis_efforts_and_gravity_that_few_have(compiled):
@@ -124,7 +126,7 @@ kernels.mass_and_bias(arm, 9.81, q[0], dq[0], ddq[0], M, bias)
 kernels.place_and_jacobian(arm, 8, (0.1, 0.2, 0.3), q[0], J)
 results = (
     rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq), rigid_body.mass_matrix(CHAIN, BODIES, q),
-    rigid_body.regressor(CHAIN, q, dq, ddq), M, bias, J,
+    rigid_body.compiled_regressor(CHAIN, q, dq, ddq), M, bias, J,
 )
 print(hashlib.sha256(b"".join(x.tobytes() for x in results)).hexdigest())
 """
@@ -154,10 +156,8 @@ def test_a_sample_that_is_not_a_number_spoils_no_other(compiled):
     q, dq, ddq = motions(6)
     q[0] = dq[20] = np.nan
     good = np.setdiff1d(np.arange(N), [0, 20])
-    for f in (
-        lambda: rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq),
-        lambda: rigid_body.regressor(CHAIN, q, dq, ddq),
-    ):
-        for found in compiled(f):
-            assert np.isfinite(found[good]).all()
-            assert np.isnan(found[0]).any()
+    of_both = compiled(lambda: rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq))
+    regressors = [f(CHAIN, q, dq, ddq) for f in (rigid_body.regressor, rigid_body.compiled_regressor)]
+    for found in (*of_both, *regressors):
+        assert np.isfinite(found[good]).all()
+        assert np.isnan(found[0]).any()

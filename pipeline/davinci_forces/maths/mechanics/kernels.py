@@ -24,11 +24,11 @@ def _functions(module: ModuleType) -> list[Callable[..., object]]:
     return [f for f in vars(module).values() if isfunction(f) and f.__module__ == module.__name__]
 
 
-for _function in (*_functions(link), *_functions(recursions)):
-    register_jitable(forceinline=True)(_function)  # a call inside a loop prevents vector instructions
+for _function in (*_functions(link), *_functions(recursions)):  # a call inside a loop prevents vector instructions
+    register_jitable(forceinline=True, no_cfunc_wrapper=True)(_function)
 
 
-@register_jitable(forceinline=True)  # type: ignore[untyped-decorator]
+@register_jitable(forceinline=True, no_cfunc_wrapper=True)  # type: ignore[untyped-decorator]
 def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
     """Put up to S samples (K, n) into joints (n + 1, 5, S)."""
     for s in range(q.shape[0]):

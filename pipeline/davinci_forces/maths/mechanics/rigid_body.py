@@ -6,6 +6,8 @@ Shapes: q, dq, ddq, tau are (..., n) in rad or m, their rates, and N m or N.  Le
 more than n coordinates, the others are at rest at 0.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,7 +22,7 @@ ALL = (slice(None),)  # index of all samples, for numpy
 RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
 # [m, or N/kg] Products of lengths of metres have rounding errors of 1e-15; files state angles to eleven digits.
 MIN_GRAVITY_ENTRY = 1e-6
-COMPILE_FROM = 2_000  # samples; numpy computes fewer before the kernels are loaded
+COMPILE_FROM = 20_000  # samples; numpy computes fewer before the kernels are loaded, and they take long to compile
 
 
 def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | None = None) -> Array:
@@ -89,21 +91,27 @@ def inverse_dynamics(
     return tau if drives is None else np.asarray(tau + drives.inertia * ddq + drives.friction(dq))
 
 
-def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
-    """Y (..., n, 10 L) of tau = Y pi, with the inertial parameters pi of all links (`Bodies.parameters`).  (6.3)"""
+def regressor(
+    chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, rows: Sequence[int] | None = None, L: int | None = None
+) -> Array:
+    """Y (..., n, 10 L) of tau = Y pi, with the inertial parameters pi of all links (`Bodies.parameters`).  (6.3)
+
+    With `rows` and `L`, Y (..., m, 10 L) has the efforts of m coordinates, and the parameters of the first L links.
+    """
     q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
-    if _many(q):
-        return compiled_regressor(chain, q, dq, ddq)
-    n, L = q.shape[-1], len(chain.parent)
-    N = q.size // n
-    tree = tree_of(chain.with_coordinates(n), np.zeros((L, 10)))
+    n, L = q.shape[-1], len(chain.parent) if L is None else L
+    rows, N = list(range(n) if rows is None else rows), q.size // n
+    tree = tree_of(chain.with_coordinates(n), np.zeros((len(chain.parent), 10)))
+    moves = tree.moves & np.isin(np.arange(n), rows)
     work, Y = np.zeros(((n + 1) * (L + 1), 9, N)), np.zeros((n, L, 10, N))
-    recursions.regressor(tree.lists(), GRAVITY, _joints(q, dq, ddq), work, Y, ALL)
-    return np.moveaxis(Y, -1, 0).reshape(*q.shape, 10 * L)
+    recursions.regressor(
+        tree._replace(parent=tree.parent[:L], moves=moves).lists(), GRAVITY, _joints(q, dq, ddq), work, Y, ALL
+    )
+    return np.moveaxis(Y[rows], -1, 0).reshape(*q.shape[:-1], len(rows), 10 * L)
 
 
 def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
-    """Y (..., n, 10 L) of `regressor`, always by the compiled kernels: for callers that compute it repeatedly."""
+    """Y (..., n, 10 L) of `regressor`, by the compiled kernels: for callers that compute all of it repeatedly."""
     from davinci_forces.maths.mechanics.kernels import regressors
 
     n, L = q.shape[-1], len(chain.parent)

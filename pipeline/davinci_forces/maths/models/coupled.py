@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, BaseParameters, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
@@ -80,7 +80,7 @@ class CoupledArm:
         Phi, valid = np.zeros((N, len(self.rows), b + sum(map(len, self.friction)))), np.ones(N, np.bool_)
         for samples in (slice(i, i + LINK_SAMPLES) for i in range(0, N, LINK_SAMPLES)):
             q, dq, ddq = (x[samples] for x in motion[:3])
-            Phi[samples, :, :b] = of_links(self.chain, self.rows, q, dq, ddq)[:, :, self.base.columns]
+            Phi[samples, :, :b] = of_links(self.chain, self.rows, q, dq, ddq, self.base.columns)
         for row, joint, term, column in self._frictions():
             z, z_valid = friction_state(motion, joint, term)
             valid &= z_valid
@@ -97,10 +97,10 @@ class CoupledArm:
         """Derivatives (N, m, m, p) of M at q (N, n) by the parameters; M is linear in them."""
         still, base = np.zeros_like(q), self.base.columns
         columns = np.zeros((len(q), len(self.rows), len(self.rows), len(self.parameters)))
-        gravity = of_links(self.chain, self.rows, q, still, still)[:, :, base]
+        gravity = of_links(self.chain, self.rows, q, still, still, base)
         for j, row in enumerate(self.rows):
             unit = still + np.eye(q.shape[1])[row]
-            columns[:, :, j, : len(base)] = of_links(self.chain, self.rows, q, still, unit)[:, :, base] - gravity
+            columns[:, :, j, : len(base)] = of_links(self.chain, self.rows, q, still, unit, base) - gravity
         return columns
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
@@ -141,12 +141,16 @@ class CoupledArm:
         return Parameter(f"{term.name}{self._of(row)}", term.typst, unit, term.positive, term.scale)
 
 
-def of_links(chain: Chain, rows: tuple[int, ...], q: Array, dq: Array, ddq: Array) -> Array:
-    """The regressor (N, m, 10 L + 3 m) of all links, and of the drives and cables of each row."""
-    joints = list(rows)
-    Y, identity = regressor(chain, q, dq, ddq)[:, joints], np.eye(len(joints))
-    added = (x[:, :, None] * identity for x in (ddq[:, joints], q[:, joints], np.ones_like(q[:, joints])))
-    return np.concatenate([Y, *added], axis=2)
+def of_links(
+    chain: Chain, rows: tuple[int, ...], q: Array, dq: Array, ddq: Array, columns: Integers | None = None
+) -> Array:
+    """The regressor (N, m, 10 L + 3 m) of all links, and of the drives and cables of each row; or some columns."""
+    joints, L = list(rows), 10 * len(chain.parent)
+    identity, columns = np.eye(len(joints)), np.arange(L + 3 * len(joints)) if columns is None else columns
+    of_bodies = columns[columns < L]  # the links after the last of them are not computed
+    Y = regressor(chain, q, dq, ddq, joints, int(of_bodies.max(initial=-1)) // 10 + 1)[:, :, of_bodies]
+    added = [x[:, :, None] * identity for x in (ddq[:, joints], q[:, joints], np.ones_like(q[:, joints]))]
+    return np.concatenate([Y, np.concatenate(added, axis=2)[:, :, columns[columns >= L] - L]], axis=2)
 
 
 @cache
