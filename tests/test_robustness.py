@@ -35,6 +35,9 @@ from tests.conftest import once
 from tests.test_runs import call, processed, reports
 
 
+pytestmark = pytest.mark.usefixtures("typeset_once")
+
+
 @pytest.fixture
 def raw(tmp_path):
     """An empty raw/ folder."""
