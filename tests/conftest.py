@@ -5,7 +5,7 @@ import os
 import signal
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -407,6 +407,24 @@ def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert done.exit_code == 0, done.output
 
     return once(tmp_path_factory, "analysed", make) / "raw" / "arm"
+
+
+@pytest.fixture(scope="module")
+def typeset_once() -> Iterator[None]:
+    """Each page is typeset once a file of tests: where a report is made anew, it is nearly always the one that was."""
+    import typst
+
+    compile_page, known = typst.compile_with_warnings, {}
+
+    def remembered(template, **options):
+        key = template, repr(sorted(options.items()))
+        if key not in known:
+            known[key] = compile_page(template, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typst, "compile_with_warnings", remembered)
+        yield
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:

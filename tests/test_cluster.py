@@ -29,7 +29,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
 MODULE = [sys.executable, "-m"]
-RECORDINGS = int(os.environ.get("DAVINCI_FORCES_RECORDINGS", "8"))
+RECORDINGS = int(os.environ.get("DAVINCI_FORCES_RECORDINGS", "5"))
 
 
 @dataclass

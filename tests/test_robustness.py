@@ -34,6 +34,8 @@ from tests import arm
 from tests.conftest import once
 from tests.test_runs import call, processed, reports
 
+pytestmark = pytest.mark.usefixtures("typeset_once")
+
 
 @pytest.fixture
 def raw(tmp_path):

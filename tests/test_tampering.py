@@ -22,23 +22,7 @@ from davinci_forces.runner.ledger import Folders, Ledger
 from tests.test_robustness import analysed, finished, flat  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, processed, reports
 
-
-@pytest.fixture(scope="module", autouse=True)
-def typeset_once():
-    """Each page is typeset once: `verify` renders every report anew, nearly always the one that was made."""
-    import typst
-
-    compile_page, known = typst.compile_with_warnings, {}
-
-    def remembered(template, **options):
-        key = template, repr(sorted(options.items()))
-        if key not in known:
-            known[key] = compile_page(template, **options)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(typst, "compile_with_warnings", remembered)
-        yield
+pytestmark = pytest.mark.usefixtures("typeset_once")
 
 
 def ledger_of(study: Path) -> Ledger:

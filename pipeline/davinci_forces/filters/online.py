@@ -93,9 +93,9 @@ class LinkTree:
 
     def poses(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Rotations (B, 3, 3) and positions (B, 3) of the links in the frames of their parents, at q (B, n)."""
-        R, r = [], []
+        R, r = list[Array](), list[Array]()
         for k, slides, T in zip(self.coordinate, self.slides, self.placement, strict=True):
-            x = q[:, k, None] if k >= 0 else np.zeros((len(q), 1))
+            x: Array = q[:, k, None] if k >= 0 else np.zeros((len(q), 1))
             c, s = (np.ones_like(x), np.zeros_like(x)) if slides else (np.cos(x), np.sin(x))
             R.append(np.stack([c * T[:, 0] + s * T[:, 1], c * T[:, 1] - s * T[:, 0], T[:, 2] + 0.0 * x], axis=-1))
             r.append(T[:, 3] + (x * T[:, 2] if slides else 0.0 * x))
