@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, rigid_body
-from davinci_forces.maths.simulation.closed_loop import arm
+from davinci_forces.maths.mechanics.kernels import place_and_jacobian
+from davinci_forces.maths.simulation.closed_loop import arm, dynamics
 from davinci_forces.robots.davinci import ROBOT
 
 random = np.random.default_rng(4)
@@ -15,9 +16,9 @@ def test_inertia_bias_and_tip_agree_with_the_vectorised_dynamics(n):
     plant = arm(ROBOT.chain, ROBOT.bodies, np.full(n, 0.1))
     for q, dq in random.uniform(-1, 1, (20, 2, n)):
         M, b = np.empty((n, n)), np.empty(n)
-        plant.dynamics(plant.data, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
+        dynamics(plant, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
         J = np.empty((3, n))
-        x = plant.tip(plant.data, q, J)
+        x = place_and_jacobian(plant.tree, plant.body, plant.tip, q, J)
         expected = rigid_body.mass_matrix(ROBOT.chain, ROBOT.bodies, q) + 0.1 * np.eye(n)
         assert np.allclose(M, expected, rtol=0, atol=1e-12)
         assert np.allclose(b, rigid_body.inverse_dynamics(ROBOT.chain, ROBOT.bodies, q, dq, 0 * q), rtol=0, atol=1e-12)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from davinci_forces.maths.simulation import closed_loop
 from davinci_forces.maths.simulation.closed_loop import arm
 from davinci_forces.maths.simulation.step import Friction, State, middle, step
 from davinci_forces.robots.davinci import ROBOT
@@ -35,7 +36,7 @@ def run(state, tau, h, steps, what=None, M=None, lower=-np.inf, upper=np.inf, mo
 def dynamics(plant, q, dq) -> tuple[np.ndarray, np.ndarray]:
     """Inertia (n, n) and bias (n,) of a plant at one configuration."""
     M, b = np.empty((len(q), len(q))), np.empty(len(q))
-    plant.dynamics(plant.data, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
+    closed_loop.dynamics(plant, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
     return M, b
 
 

@@ -5,14 +5,13 @@ commands, and a sample is recorded.  Between ticks the rigid body moves by one i
 inertia, bias and tip are compiled.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compile_function
+from davinci_forces.maths.compiled import compile_and_store, compile_function
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
@@ -24,15 +23,13 @@ from davinci_forces.maths.simulation.surroundings import Surroundings, on_tip, w
 
 
 class Plant(NamedTuple):
-    """The rigid body: two compiled functions and their data.
+    """The rigid body: the arm, its rotors and its tip."""
 
-    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), motors included, and the bias (n,) of Coriolis and gravity.
-    `tip(data, q, J)` fills the Jacobian (3, n) of the tip and returns its position (3,), both in the base frame.
-    """
-
-    dynamics: Callable[..., None]
-    tip: Callable[..., Array]
-    data: Any
+    tree: Tree
+    rest: Array  # zero acceleration (n,)
+    rotors: Array  # eta^2 J_m (n,)
+    body: int  # body to which the tip is fixed
+    tip: tuple[float, float, float]  # in that body's frame [m]
 
 
 class JointConstraints(NamedTuple):
@@ -61,6 +58,24 @@ class Simulated(NamedTuple):
     force: Array  # of the tip on the surroundings, base frame
 
 
+def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
+    """The plant of an arm with n joints and their `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
+    n = len(rotors)
+    chain, parameters = fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10))
+    frame = chain.names.index(chain.tip)
+    x, y, z = chain.offset[frame, :3, 3].tolist()
+    tree = tree_of(chain, parameters)
+    return Plant(tree, np.zeros(n), rotors.astype(np.float64), int(chain.body[frame]), (x, y, z))
+
+
+@compile_function
+def dynamics(plant: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
+    """Fill M (n, n), rotors included, and b (n,) = C dq + G.  (A.12)"""
+    mass_and_bias(plant.tree, GRAVITY, q, dq, plant.rest, M, b)
+    for i in range(len(q)):
+        M[i, i] += plant.rotors[i]
+
+
 def simulate(
     plant: Plant, body: JointConstraints, motors: Motors, law: Cascade | Regulator, timing: Timing, reference: Array,
     around: Surroundings, q: Array,
@@ -73,15 +88,14 @@ def simulate(
     out = Simulated(np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, 3)))
     state = at_rest(q)
     run = _cascade if isinstance(law, Cascade) else _regulator
-    run(plant.dynamics, plant.tip, plant.data, body, motors, law, timing, reference, around, state, out)
+    run(plant, body, motors, law, timing, reference, around, state, out)
     return out
 
 
-@compile_function
+@compile_and_store
 def _cascade(
-    dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
-    state: Any, out: Any,
-) -> None:  # fmt: skip
+    plant: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any, state: Any, out: Any
+) -> None:
     """Simulate three cascaded PI loops for each joint.  Fig 2.5"""
     n, h = len(state.q), timing.tick
     loops = Loops(
@@ -95,14 +109,13 @@ def _cascade(
             if tick == 0:
                 follow(motors, law, loops, reference[k], angle, h * timing.ticks)
             drive(motors, law, loops, angle, state.dq, (tick + 1) / timing.ticks, h, tau)
-            _tick(dynamics, tip, data, body, around, state, tau, h, k, tick, timing.ticks, out)
+            _tick(plant, body, around, state, tau, h, k, tick, timing.ticks, out)
 
 
-@compile_function
+@compile_and_store
 def _regulator(
-    dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
-    state: Any, out: Any,
-) -> None:  # fmt: skip
+    plant: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any, state: Any, out: Any
+) -> None:
     """Simulate PID with gravity compensation; the motors give the commanded effort up to their current limit."""
     n, period = len(state.q), timing.tick * timing.ticks
     M, G, zero, integral, tau = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -110,7 +123,7 @@ def _regulator(
     read(motors, state.q, before)
     for k in range(len(reference)):
         read(motors, state.q, angle)
-        dynamics(data, angle / motors.gear_ratio, zero, M, G)
+        dynamics(plant, angle / motors.gear_ratio, zero, M, G)
         for j in range(n):
             error = reference[k, j] - angle[j] / motors.gear_ratio[j]
             damping = law.derivative[j] * (angle[j] - before[j]) / (period * motors.gear_ratio[j])
@@ -118,14 +131,13 @@ def _regulator(
             output, integral[j] = pi(error, law.proportional[j], law.integral[j], integral[j], period, limit)
             tau[j], before[j] = min(max(output + (law.gravity * G[j] - damping), -limit), limit), angle[j]
         for tick in range(timing.ticks):
-            _tick(dynamics, tip, data, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
+            _tick(plant, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
 
 
 @compile_function
 def _tick(
-    dynamics: Any, tip: Any, data: Any, body: Any, around: Any, state: Any, tau: Any, h: float, k: int, tick: int,
-    ticks: int, out: Any,
-) -> None:  # fmt: skip
+    plant: Any, body: Any, around: Any, state: Any, tau: Any, h: float, k: int, tick: int, ticks: int, out: Any
+) -> None:
     """Move for one tick with constant motor efforts tau (n,), and record at the controller's instants."""
     n, now = len(state.q), k * ticks + tick
     M, b, J, free = np.empty((n, n)), np.empty(n), np.zeros((3, n)), np.empty(n)
@@ -134,11 +146,11 @@ def _tick(
     for i in range(n):
         start[i], external[i] = state.dq[i], around.efforts[now, i]
     middle(state, h, q, dq)
-    dynamics(data, q, dq, M, b)
+    dynamics(plant, q, dq, M, b)
     if around.mass > 0:
-        weigh(tip, data, q, dq, J, drift)
+        weigh(plant, q, dq, J, drift)
     if around.at_tip:
-        x = tip(data, q, J)
+        x = np.array(place_and_jacobian(plant.tree, plant.body, plant.tip, q, J))
         _through(J, dq, velocity)
         on_tip(around, now, x, velocity, force)
     for i in range(n):
@@ -175,39 +187,3 @@ def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -
         out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
     for c in range(3):
         out.force[k, c] = force[c]
-
-
-class PlantData(NamedTuple):
-    """The data of the plant's two functions: the arm, its rotors and its tip."""
-
-    tree: Tree
-    rest: Array  # zero acceleration (n,)
-    rotors: Array  # eta^2 J_m (n,)
-    body: int  # body to which the tip is fixed
-    tip: tuple[float, float, float]  # in that body's frame [m]
-
-
-def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
-    """The plant of an arm with n joints and their `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
-    n = len(rotors)
-    chain, parameters = fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10))
-    frame = chain.names.index(chain.tip)
-    x, y, z = chain.offset[frame, :3, 3].tolist()
-    data = PlantData(
-        tree_of(chain, parameters), np.zeros(n), rotors.astype(np.float64), int(chain.body[frame]), (x, y, z)
-    )
-    return Plant(dynamics, _tip, data)
-
-
-@compile_function
-def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
-    """Fill M, rotors included, and b = C dq + G.  (A.12)"""
-    mass_and_bias(body.tree, GRAVITY, q, dq, body.rest, M, b)
-    for i in range(len(q)):
-        M[i, i] += body.rotors[i]
-
-
-@compile_function
-def _tip(body: Any, q: Any, J: Any) -> Any:
-    """Fill the Jacobian (3, n) of the tip, and return its position (3,).  (7.23)"""
-    return np.array(place_and_jacobian(body.tree, body.body, body.tip, q, J))

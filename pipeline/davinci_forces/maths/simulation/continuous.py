@@ -41,8 +41,8 @@ def regulate(
 
     def effort(q: Array, dq: Array, integral: Array) -> Array:
         """The controller's effort (n,); M and b are filled with the arm's inertia and bias.  (5.17)"""
-        mass_and_bias(model.data.tree, GRAVITY, q, rest, rest, M, G)  # G is the gravity that the compensation assumes
-        mass_and_bias(plant.data.tree, GRAVITY, q, dq, rest, M, b)
+        mass_and_bias(model.tree, GRAVITY, q, rest, rest, M, G)  # G is the gravity that the compensation assumes
+        mass_and_bias(plant.tree, GRAVITY, q, dq, rest, M, b)
         return law.proportional * (target - q) - law.derivative * dq + law.gravity * G + law.integral * integral
 
     def slope(_: float, state: Array) -> Array:
@@ -54,13 +54,13 @@ def regulate(
     def jacobian(_: float, state: Array) -> Array:
         """d slope / d state (3 n, 3 n) without the small change of M and b; differences would be rounding at rest."""
         q, dq = np.ascontiguousarray(state).reshape(3, n)[:2]
-        mass_and_bias(plant.data.tree, GRAVITY, q, dq, rest, M, b)
+        mass_and_bias(plant.tree, GRAVITY, q, dq, rest, M, b)
         gains = (-law.proportional, -law.derivative - viscous, law.integral)
         accelerations = np.linalg.solve(M + inertia, np.hstack([np.diag(gain) for gain in gains]))
         zero, one = np.zeros((n, n)), np.eye(n)
         return np.block([[zero, one, zero], [accelerations], [-one, zero, zero]])
 
-    start, inertia = np.concatenate([q, np.zeros(2 * n)]), np.diag(plant.data.rotors)
+    start, inertia = np.concatenate([q, np.zeros(2 * n)]), np.diag(plant.rotors)
     solution = solve_ivp(slope, (0.0, duration), start, method="Radau", jac=jacobian, rtol=RELATIVE, atol=ABSOLUTE)
     if not solution.success:
         raise ArithmeticError(f"the solver stopped at {solution.t[-1]:g} s: {solution.message}")

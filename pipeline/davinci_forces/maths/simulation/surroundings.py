@@ -11,6 +11,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics.kernels import place_and_jacobian
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -59,14 +60,14 @@ def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
 
 
 @compile_function
-def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
+def weigh(plant: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
     """Fill the Jacobian J (3, n) of the tip, and `drift` = dJ/dt dq + g up (3,) [m/s^2].
 
     The robot exerts m (a + g up) = m (J ddq + drift) on a mass m at the tip.  Section 7.5
     """
     ahead, h = np.empty_like(J), 1e-6
-    tip(data, q, J)
-    tip(data, q + h * dq, ahead)
+    place_and_jacobian(plant.tree, plant.body, plant.tip, q, J)
+    place_and_jacobian(plant.tree, plant.body, plant.tip, q + h * dq, ahead)
     for k in range(3):
         drift[k] = GRAVITY if k == 2 else 0.0
         for i in range(len(q)):
