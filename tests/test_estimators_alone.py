@@ -33,6 +33,29 @@ def test_residuals_that_count_less_beyond_a_size_balance(monkeypatch):
     assert len(steps) < huber.MAX_STEPS_HUBER  # or it would not have converged
 
 
+def test_known_noise_counts_at_samples_within_the_bound_over_their_share():
+    """As that of least squares does at all of them."""
+    rng = np.random.default_rng(1)
+    p = replace(outliers(), noise=rng.normal(size=K), periods=rng.integers(0, 4, K))
+    robust, valid = huber.estimate(p), p.periods > 0
+    residual = np.sqrt(p.periods) * np.abs(p.tau - p.Phi @ robust.theta)
+    inside = residual < 1.345 * np.median(residual[valid]) / 0.6745
+    plain = lse.estimate(replace(p, noise=p.noise * inside))
+    assert_allclose(robust.standard_errors.noise * inside[valid].mean(), plain.standard_errors.noise, rtol=1e-9)
+
+
+@pytest.mark.parametrize("condition", [0.9e10, 1.1e10])
+def test_columns_of_a_condition_number_above_ten_billion_are_not_told_apart(condition):
+    """Of two columns at a small angle a, it is 2 / a."""
+    p, Q = problem(seed=1), np.linalg.qr(np.random.default_rng(0).normal(size=(K, 2)))[0]
+    p = replace(p, Phi=np.column_stack([Q[:, 0], Q[:, 0] + 2.0 / condition * Q[:, 1]]), names=("one", "other"))
+    if condition < 1e10:
+        factorise(p, p.weight)
+    else:
+        with pytest.raises(NotIdentifiable, match=r"does not separate one, other: condition number 1\.1e\+10 of"):
+            factorise(p, p.weight)
+
+
 @pytest.mark.parametrize("estimator", [lse, wlse, huber])
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_an_estimate_is_the_same_whatever_the_unit_of_the_effort(estimator, unit):
@@ -79,10 +102,11 @@ def test_pooled_variances_are_means_over_neighbours_that_hold_enough_degrees_of_
     assert wlse.median_periods(np.array([1, 1, 3])) == 1
 
 
-def test_a_prior_has_the_strength_that_makes_the_data_most_likely():
+@pytest.mark.parametrize("error", [1.0, 0.01])
+def test_a_prior_has_the_strength_that_makes_the_data_most_likely(error):
     """By the density of the data itself: normal, of the noise and of parameters that scatter around the guess."""
     p, some = problem(4), slice(None, None, 4)
-    guess = THETA * np.array([1.3, 0.8, 1.1, 0.9])
+    guess = THETA * (1.0 + error * np.array([0.3, -0.2, 0.1, -0.1]))
     p = Regression(p.Phi[some], p.tau[some], p.tau_var[some], p.periods[some], (0,), NAMES, Prior(guess=guess))
     F = p.Phi * np.abs(guess)  # in units of the guess
     y = p.tau - p.Phi @ guess
@@ -122,14 +146,46 @@ def test_noise_that_hides_one_column_is_reported_of_that_column_alone():
         tls.estimate(noisy(variances))
 
 
-def test_total_least_squares_solve_their_equations():
+@pytest.mark.parametrize("share", [0.48, 0.52])
+def test_a_column_of_which_more_than_half_is_noise_is_refused_with_its_share(share):
+    """Of what the other columns do not explain of it."""
+    p, others = problem(seed=1), PHI[:, 1:]
+    alone = PHI[:, 0] - others @ np.linalg.lstsq(others, PHI[:, 0])[0]
+    variances = np.zeros(len(NAMES))
+    variances[0] = share * np.mean(alone**2)
+    p = replace(p, Phi_cov=np.diag(variances)[None])
+    if share < 0.5:
+        assert np.isfinite(tls.estimate(p).theta).all()
+    else:
+        with pytest.raises(NotIdentifiable, match=f"noise is 52 % of the excitation of {NAMES[0]};"):
+            tls.estimate(p)
+
+
+def test_total_least_squares_solve_their_equations(monkeypatch):
     """(Phi' Phi - K C) theta = Phi' tau, which takes what the noise of the motion adds to the squares away again."""
     variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, 1.0, 0.0])
     p = noisy(variances)
     corrected = np.linalg.solve(p.Phi.T @ p.Phi - K * np.diag(variances), p.Phi.T @ p.tau)
+    steps, plain = [], tls.fit_for_noise
+    monkeypatch.setattr(tls, "fit_for_noise", lambda *given: steps.append(1) or plain(*given))
     theta = tls.estimate(p).theta
+    assert len(steps) < tls.MAX_STEPS_TLS  # or it would not have converged
     wrong = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
-    assert np.linalg.norm(theta - corrected) < 0.2 * np.linalg.norm(wrong - corrected)
+    assert_allclose(theta, corrected, rtol=1e-7)
+    assert np.abs(wrong / corrected - 1.0).max() > 0.01
+
+
+def test_the_effort_has_at_least_the_noise_by_which_its_periods_differ():
+    """(Phi' Phi - lambda C) theta = Phi' tau, lambda = |tau - Phi theta|^2 / (v + theta' C theta), v that noise."""
+    variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, 1.0, 0.0])
+    p, recorded = noisy(variances), np.arange(K) % 7 > 0
+    p = replace(p, tau_var=np.where(recorded, 1.0, 1e6), periods=np.where(recorded, M, 0))
+    theta, C, v = tls.estimate(p).theta, p.periods.sum() * np.diag(variances), np.count_nonzero(recorded)
+    residual = p.tau - p.Phi @ theta
+    share = p.periods @ residual**2 / (v + theta @ C @ theta)
+    assert share < 0.9
+    normal = p.Phi.T @ (p.periods * residual) + share * C @ theta
+    assert_allclose(normal, 0.0, atol=1e-6 * np.abs(p.Phi.T @ (p.periods * p.tau)).max())
 
 
 ERROR = np.sqrt(2 / (K - 4))  # of the mean square of K residuals of noise, as a share
