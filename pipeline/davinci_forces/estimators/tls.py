@@ -65,7 +65,7 @@ def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
     variance, axes = np.linalg.eigh(C)
     variance = np.where(variance > EXACT * variance.max(), variance, 0.0)
     theta = R.theta * R.scale
-    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y + R.min_squares))
+    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y))
     v = 0.0
     for _ in range(MAX_STEPS_TLS):
         squares = R.min_squares + float(((R.U @ theta - R.y) ** 2).sum())
