@@ -26,7 +26,6 @@ from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
-from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness, record
 from davinci_forces.stages.forces import ekf as stage
@@ -389,18 +388,6 @@ def test_an_offset_that_drifts_is_remarked_on(identified):
     signal = arm.signal(seed=5, period=7.3, role="validation", external=lambda t: 0.02 * t)
     *_, said = sorted(tracked(identified, signal, free=((0.0, 60.0),)), key=lambda r: isinstance(r, Diagnostic))
     assert "drifts within the free windows" in said.text[0]
-
-
-@pytest.mark.parametrize(("drift", "drifts"), [(1.9, False), (-1.9, False), (2.1, True), (-2.1, True)])
-def test_halves_that_differ_by_two_standard_errors_are_a_drift(drift, drifts):
-    assert DayOffset(1.0, 0.1, 0.3 * drift, 0.3).drifts == drifts
-
-
-def test_an_offset_is_the_mean_in_its_windows_and_each_half_of_two_samples_may_be_all_noise():
-    t, residual = np.arange(5.0), np.array([9.0, 1.0, 3.0, 9.0, 9.0])
-    offset = day_offset(t, residual, [(0.5, 2.5)])
-    assert (offset.value, offset.drift, offset.drift_std) == (2.0, 2.0, np.hypot(1.0, 3.0))
-    assert day_offset(t, residual, [(0.5, 1.5)]) == DayOffset(0.0, 0.0, 0.0, 0.0)
 
 
 def test_a_clock_that_is_wrong_by_a_thousand_is_said_and_not_believed(identified):

@@ -66,7 +66,7 @@ def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
     variance = np.where(variance > EXACT * variance.max(), variance, 0.0)
     theta = R.theta * R.scale
     floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y))
-    v = 0.0
+    v = np.inf
     for _ in range(MAX_STEPS_TLS):
         squares = R.min_squares + float(((R.U @ theta - R.y) ** 2).sum())
         before, v = v, max(squares - float(theta @ C @ theta), floor)
