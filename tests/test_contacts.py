@@ -558,6 +558,20 @@ def test_a_touch_in_a_log_of_free_motion_is_named_and_free_motion_is_not():
     assert len(list(assess.run(track(slow_noise(0.05) + push, role="validation"), stated, arm.ARM))) == 2
 
 
+@pytest.mark.parametrize(("size", "touches"), [(2.9, False), (3.1, True), (-3.1, True)])
+def test_what_is_three_times_above_the_level_of_the_rest_of_a_log_is_a_touch(monkeypatch, size, touches):
+    monkeypatch.setattr(assess, "typical_alarm_level", lambda *given: 0.1)
+    effort = np.where(np.arange(len(T)) == 2000, 0.1 * size, 0.0)
+    warnings = assess.touch_warning(track(effort), np.ones(len(T), bool), arm.ARM)
+    assert ["at 20.00 s" in warning.text[0] for warning in warnings] == [True] * touches
+
+
+@pytest.mark.parametrize(("samples", "levels"), [(99, 0), (100, 1)])
+def test_a_level_takes_a_hundred_samples_of_free_space(samples, levels):
+    free = np.arange(len(T)) < samples
+    assert len(list(assess.space_of(track(noise()), "rts", noise(), np.full(len(T), 0.1), free))) == levels
+
+
 def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():
     found = day_offset(np.arange(4.0), np.array([0.2, 0.2, 0.4, 0.4]), [(-0.5, 3.5)])
     assert found.value == pytest.approx(0.3)

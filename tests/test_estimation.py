@@ -246,6 +246,10 @@ def test_every_log_is_left_out_once_by_refits_to_all_the_others():
     assert len(cross) == 3 * 4
 
 
+def test_a_hundred_logs_are_left_out_five_at_a_time():
+    assert folds(100) == [i // 5 for i in range(100)]
+
+
 def test_many_logs_are_left_out_in_twenty_folds_of_neighbours():
     assert folds(20) == list(range(20))
     for count in (21, 45, 400):

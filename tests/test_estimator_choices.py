@@ -127,6 +127,19 @@ def test_weights_that_are_not_numbers_are_refused():
         estimator("wlse")(replace(problem(seed=1), tau_var=var))
 
 
+def test_each_log_has_weights_of_its_own_variance_and_enough_periods():
+    a, b = problem(seed=1), problem(seed=2, sigma=1.0)
+    columns = {
+        name: np.concatenate([getattr(p, name) for p in (a, b)]) for name in ("Phi", "tau", "tau_var", "periods")
+    }
+    both = replace(a, **columns, starts=(0, K))
+    weight = np.concatenate([p.periods / pool_variance(p.tau_var, p.periods) for p in (a, b)])
+    assert_allclose(estimator("wlse")(both).theta, factorise(both, weight).theta, rtol=1e-9)
+    few = replace(both, periods=np.where(np.arange(2 * K) < K, 10, 3))
+    with pytest.raises(NotIdentifiable, match="and one holds 3"):
+        estimator("wlse")(few)
+
+
 def test_weights_of_three_periods_are_refused():
     with pytest.raises(NotIdentifiable, match="at least 4 periods in every log, and one holds 3"):
         estimator("wlse")(replace(problem(seed=1), periods=np.full(K, 3)))
@@ -154,10 +167,14 @@ def test_an_excess_of_three_standard_errors_is_the_model_s_error(excess, is_mode
     assert_allclose(estimator("wlse")(p).theta, expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize("periods", [np.full(41, 5), np.full(41, 300), 5 + np.arange(41) % 3])
+@pytest.mark.parametrize(
+    "periods",
+    [np.full(41, 9), np.full(41, 300), 5 + np.arange(41) % 3, np.where(np.arange(41) % 5, 9, np.arange(41) % 2)],
+)
 def test_a_variance_is_pooled_over_the_fewest_neighbours_that_have_200_degrees(periods):
-    var = np.random.default_rng(1).chisquare(4, size=41)
-    half = min(int(np.ceil(200 / np.median(periods - 1))) // 2, 20)
+    var = np.random.default_rng(1).chisquare(4, size=41) ** 3  # of a wide range
+    degrees = np.maximum(periods - 1, 0)  # a sample of one period tells nothing of the variance, as one of none
+    half = min(int(np.ceil(200 / np.median(degrees))) // 2, 20)
     around = [np.arange(k - half, k + half + 1) % 41 for k in range(41)]
-    expected = [np.average(var[near], weights=(periods - 1)[near]) for near in around]
+    expected = [np.average(var[near], weights=degrees[near]) for near in around]
     assert_allclose(pool_variance(var, periods), expected, rtol=1e-12)

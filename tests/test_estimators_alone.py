@@ -33,12 +33,51 @@ def test_residuals_that_count_less_beyond_a_size_balance(monkeypatch):
     assert len(steps) < huber.MAX_STEPS_HUBER  # or it would not have converged
 
 
+def test_known_noise_counts_at_samples_within_the_bound_over_their_share():
+    """As that of least squares does at all of them."""
+    rng = np.random.default_rng(1)
+    p = replace(outliers(), noise=rng.normal(size=K), periods=rng.integers(0, 4, K))
+    robust, valid = huber.estimate(p), p.periods > 0
+    residual = np.sqrt(p.periods) * np.abs(p.tau - p.Phi @ robust.theta)
+    inside = residual < 1.345 * np.median(residual[valid]) / 0.6745
+    plain = lse.estimate(replace(p, noise=p.noise * inside))
+    assert_allclose(robust.standard_errors.noise * inside[valid].mean(), plain.standard_errors.noise, rtol=1e-9)
+
+
+@pytest.mark.parametrize("condition", [0.9e10, 1.1e10])
+def test_columns_of_a_condition_number_above_ten_billion_are_not_told_apart(condition):
+    """Of two columns at a small angle a, it is 2 / a."""
+    p, Q = problem(seed=1), np.linalg.qr(np.random.default_rng(0).normal(size=(K, 2)))[0]
+    p = replace(p, Phi=np.column_stack([Q[:, 0], Q[:, 0] + 2.0 / condition * Q[:, 1]]), names=("one", "other"))
+    if condition < 1e10:
+        factorise(p, p.weight)
+    else:
+        with pytest.raises(NotIdentifiable, match=r"does not separate one, other: condition number 1\.1e\+10 of"):
+            factorise(p, p.weight)
+
+
+@pytest.mark.parametrize(("part", "named"), [(0.18, [0, 2, 4]), (0.08, [0, 4])])
+def test_columns_are_named_that_make_up_a_hundredth_of_what_is_not_told_apart(part, named):
+    """Of the sum of squares of that combination of columns, each of length 1."""
+    unit, names = PHI / np.linalg.norm(PHI, axis=0), np.array([*NAMES, "the twin"])
+    Phi = np.column_stack([PHI, unit[:, 0] + part * unit[:, 2]])
+    with pytest.raises(NotIdentifiable) as refused:
+        factorise(replace(problem(seed=1), Phi=Phi, names=tuple(names)), np.ones(K))
+    assert [name for name in names if name in str(refused.value)] == names[named].tolist()
+
+
 @pytest.mark.parametrize("estimator", [lse, wlse, huber])
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_an_estimate_is_the_same_whatever_the_unit_of_the_effort(estimator, unit):
     p = outliers()
     other = Regression(p.Phi, unit * p.tau, unit**2 * p.tau_var, p.periods, p.starts, p.names)
     assert_allclose(estimator.estimate(other).theta, unit * estimator.estimate(p).theta, rtol=1e-5)
+
+
+def test_a_robust_fit_converges_whatever_the_units_of_the_columns():
+    p, unit = outliers(), np.array([1e6, 1e5, 1e7, 1e6])
+    other = huber.estimate(replace(p, Phi=p.Phi * unit))
+    assert_allclose(other.theta * unit, huber.estimate(p).theta, rtol=1e-9)
 
 
 def test_outliers_move_a_robust_fit_by_no_more_than_its_standard_error_says():
@@ -79,10 +118,11 @@ def test_pooled_variances_are_means_over_neighbours_that_hold_enough_degrees_of_
     assert wlse.median_periods(np.array([1, 1, 3])) == 1
 
 
-def test_a_prior_has_the_strength_that_makes_the_data_most_likely():
+@pytest.mark.parametrize("error", [1.0, 0.01])
+def test_a_prior_has_the_strength_that_makes_the_data_most_likely(error):
     """By the density of the data itself: normal, of the noise and of parameters that scatter around the guess."""
     p, some = problem(4), slice(None, None, 4)
-    guess = THETA * np.array([1.3, 0.8, 1.1, 0.9])
+    guess = THETA * (1.0 + error * np.array([0.3, -0.2, 0.1, -0.1]))
     p = Regression(p.Phi[some], p.tau[some], p.tau_var[some], p.periods[some], (0,), NAMES, Prior(guess=guess))
     F = p.Phi * np.abs(guess)  # in units of the guess
     y = p.tau - p.Phi @ guess
@@ -101,7 +141,7 @@ def test_instruments_are_the_regressors_before_and_after_within_each_log():
     p = problem(5)
     p = Regression(p.Phi, p.tau, p.tau_var, np.where(np.arange(K) % 9 == 0, 0, M), TWO_LOGS, NAMES)
     parts = (PHI[: K // 2], PHI[K // 2 :])
-    Z = np.concatenate([np.roll(part, iv.LAG, axis=0) + np.roll(part, -iv.LAG, axis=0) for part in parts])
+    Z = np.concatenate([np.roll(part, 3, axis=0) + np.roll(part, -3, axis=0) for part in parts])
     Z *= p.periods[:, None]
     assert_allclose(iv.estimate(p).theta, np.linalg.solve(Z.T @ PHI, Z.T @ p.tau), rtol=1e-8)
 
@@ -117,19 +157,64 @@ def noisy(variances, sigma=SIGMA, seed=6) -> Regression:
 
 def test_noise_that_hides_one_column_is_reported_of_that_column_alone():
     variances = np.zeros(len(NAMES))
-    variances[0] = 4.0 * np.mean(PHI[:, 0] ** 2)
+    variances[:2] = [4.0, 0.1] * np.mean(PHI[:, :2] ** 2, axis=0)
     with pytest.raises(NotIdentifiable, match=f"of the excitation of {NAMES[0]};"):
         tls.estimate(noisy(variances))
 
 
-def test_total_least_squares_solve_their_equations():
+@pytest.mark.parametrize(("part", "named"), [(0.6, "one, other"), (0.4, "one")])
+def test_noise_that_hides_a_combination_is_reported_of_columns_that_make_up_half_as_much_as_the_largest(part, named):
+    """Of two orthogonal columns whose noise is one and the same, in the proportion of 1 to the root of `part`."""
+    rng, noise = np.random.default_rng(0), np.array([1.0, np.sqrt(part)])
+    Phi, tau = np.linalg.qr(rng.normal(size=(K, 2)))[0], rng.normal(size=K)
+    cov = 0.8 / (1.0 + part) * np.outer(noise, noise)[None] / K
+    p = Regression(Phi, tau, np.ones(K), np.ones(K, int), (0,), ("one", "other"), Phi_cov=cov)
+    with pytest.raises(NotIdentifiable, match=f"noise is 80 % of the excitation of {named};"):
+        tls.estimate(p)
+
+
+@pytest.mark.parametrize("share", [0.48, 0.52])
+def test_a_column_of_which_more_than_half_is_noise_is_refused_with_its_share(share):
+    """Of what the other columns do not explain of it."""
+    p, others = problem(seed=1), PHI[:, 1:]
+    alone = PHI[:, 0] - others @ np.linalg.lstsq(others, PHI[:, 0])[0]
+    variances = np.zeros(len(NAMES))
+    variances[0] = share * np.mean(alone**2)
+    p = replace(p, Phi_cov=np.diag(variances)[None])
+    if share < 0.5:
+        assert np.isfinite(tls.estimate(p).theta).all()
+    else:
+        with pytest.raises(NotIdentifiable, match=f"noise is 52 % of the excitation of {NAMES[0]};"):
+            tls.estimate(p)
+
+
+@pytest.mark.parametrize(("less", "unit"), [(1.0, 1.0), (1e-4, 1e-6)])
+def test_total_least_squares_solve_their_equations(monkeypatch, less, unit):
     """(Phi' Phi - K C) theta = Phi' tau, which takes what the noise of the motion adds to the squares away again."""
-    variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, 1.0, 0.0])
+    variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, less, 0.0])
     p = noisy(variances)
+    p = replace(p, tau=unit * p.tau, tau_var=unit**2 * p.tau_var)
     corrected = np.linalg.solve(p.Phi.T @ p.Phi - K * np.diag(variances), p.Phi.T @ p.tau)
+    steps, plain = [], tls.fit_for_noise
+    monkeypatch.setattr(tls, "fit_for_noise", lambda *given: steps.append(1) or plain(*given))
     theta = tls.estimate(p).theta
+    assert len(steps) < tls.MAX_STEPS_TLS  # or it would not have converged
     wrong = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
-    assert np.linalg.norm(theta - corrected) < 0.2 * np.linalg.norm(wrong - corrected)
+    assert_allclose(theta, corrected, rtol=1e-7)
+    assert np.abs(wrong / corrected - 1.0).max() > 0.01
+
+
+def test_the_effort_has_at_least_the_noise_by_which_its_periods_differ():
+    """(Phi' Phi - lambda C) theta = Phi' tau, lambda = |tau - Phi theta|^2 / (v + theta' C theta), v that noise."""
+    variances = 0.05 * np.mean(PHI**2, axis=0) * np.array([1.0, 0.0, 1.0, 0.0])
+    p, recorded = noisy(variances), np.arange(K) % 7 > 0
+    p = replace(p, tau_var=np.where(recorded, 1.0, 1e6), periods=np.where(recorded, 1, 0))
+    theta, C, v = tls.estimate(p).theta, p.periods.sum() * np.diag(variances), np.count_nonzero(recorded)
+    residual = p.tau - p.Phi @ theta
+    share = p.periods @ residual**2 / (v + theta @ C @ theta)
+    assert share < 0.9
+    normal = p.Phi.T @ (p.periods * residual) + share * C @ theta
+    assert_allclose(normal, 0.0, atol=1e-6 * np.abs(p.Phi.T @ (p.periods * p.tau)).max())
 
 
 ERROR = np.sqrt(2 / (K - 4))  # of the mean square of K residuals of noise, as a share
@@ -179,3 +264,4 @@ def test_few_samples_count_without_the_parameters_and_without_those_that_no_peri
     variance = residual @ (weight * residual) / (np.count_nonzero(weight) - 4)
     covariance = variance * np.linalg.inv(few.Phi.T @ (weight[:, None] * few.Phi))
     assert_allclose(found.standard_errors.classical, np.sqrt(np.diag(covariance)), rtol=1e-9)
+    assert not found.standard_errors.model.any()  # that of a model is stated by whoever knows of others

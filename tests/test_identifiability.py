@@ -14,6 +14,7 @@ from davinci_forces.identification.identifiability import (
     describe_correlated,
     describe_insignificant,
     hardly_described,
+    moving_with,
     why_not_positive,
 )
 from davinci_forces.maths.estimation.least_squares import (
@@ -91,6 +92,22 @@ def test_a_parameter_that_cannot_be_told_from_zero_is_not_seen_and_its_share_is_
     assert describe_insignificant(problem(), estimator("lse")(problem())) == []
 
 
+@pytest.mark.parametrize(("ratio", "is_named"), [(1.9, True), (-1.9, True), (2.1, False)])
+def test_a_parameter_is_told_from_zero_at_two_standard_errors(ratio, is_named):
+    share = " at most 100 % of the effort"  # never more, however large the error is
+    texts = describe_insignificant(problem(seed=0), guess([ratio * 1e3, *[1e3] * 3], [1e3, 1.0, 1.0, 1.0]))
+    assert [text.endswith(share) for text in texts] == [True] * is_named
+
+
+@pytest.mark.parametrize(("noise", "is_named"), [(0.15, True), (0.18, False)])
+def test_a_combination_is_named_that_is_twenty_times_less_certain_than_the_best(noise, is_named):
+    sum_of_three = PHI[:, 0] / np.linalg.norm(PHI[:, 0]) + PHI[:, 2] / np.linalg.norm(PHI[:, 2])
+    found = of(np.column_stack([PHI, sum_of_three + noise / np.sqrt(K) * np.random.default_rng(0).normal(size=K)]))
+    assert (20.0 < found.condition < 28.0) if is_named else (15.0 < found.condition < 20.0)
+    texts = [text for text in describe_correlated([*NAMES, "sum"], found) if "less certain" in text]
+    assert [text.split(" is ")[1][:9] for text in texts] == [f"{found.condition:.0f} times "] * is_named
+
+
 def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting():
     assert advice(ROBOT, ROBOT.joint("hand_pitch"), ()) == ""
     assert "`davinci-forces excite davinci hand_pitch`" in advice(
@@ -124,6 +141,12 @@ def test_an_effort_against_the_motion_is_blamed_on_a_sign():
     assert "correct the `sign`" in blamed([-0.07, 0.01, -0.37, -0.22], [0.25, 0.01, 0.01, 0.01])  # hardly excited, too
 
 
+def test_a_sign_is_blamed_on_half_of_the_friction_if_that_is_surely_negative():
+    assert "correct the `sign`" in blamed([-0.45, 0.01, -0.37, 0.22], [0.01] * 4)
+    assert "friction is not negative" in blamed([-0.45, 0.01, -0.37, -0.22], [0.01, 0.01, 0.19, 0.12])
+    assert "cannot be distinguished from 0" in blamed([-0.45, 0.01, -0.37, 0.22], [0.23, 0.01, 0.01, 0.01])
+
+
 def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_out():
     said = blamed([-0.45, 0.01, 0.37, 0.22], [0.01] * 4)
     assert "the signs are right" in said
@@ -134,9 +157,16 @@ def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_ou
 
 
 def test_an_effort_that_its_own_terms_do_not_describe_is_said_to_be_one():
-    assert hardly_described(ROLL, 0.9, ["pan"]) == ""
+    assert hardly_described(ROLL, 0.51, ["pan"]) == ""
+    assert "explain 49 % of" in hardly_described(ROLL, 0.49, ["pan"])
+    assert "explain 0 % of" in hardly_described(ROLL, -3.0, [])
     assert "pan moves in the same logs" in hardly_described(ROLL, 0.26, ["pan"])
     assert "explain 26 % of the effort's variance: check" in hardly_described(ROLL, 0.26, [])
+
+
+def test_only_joints_that_move_in_the_same_logs_are_others():
+    moves = [("one", "roll"), ("one", "pan"), ("two", "pan"), ("two", "lift"), ("three", "slide")]
+    assert moving_with("roll", ["one", "two"], moves) == ["pan", "lift"]
 
 
 def made(signal, kind) -> list:

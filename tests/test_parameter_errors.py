@@ -8,6 +8,7 @@ import pytest
 from scipy.special import stdtrit
 
 from davinci_forces.identification import model_error
+from davinci_forces.maths.selection import Ridge, sum_equations
 from davinci_forces.records import Average, Fit, Motion, Recording, Signal, Trajectory
 from davinci_forces.simulation.motion import simulate_log, theta
 from davinci_forces.simulation.scenario.reading import load
@@ -79,6 +80,24 @@ def test_intervals_of_95_percent_hold_the_truth_in_90_to_98_percent_of_20_seeds(
     shares = (np.abs(errors[name]) < 1.96).mean(axis=1)
     half = stdtrit(len(SEEDS) - 1, 0.975) * shares.std(ddof=1) / np.sqrt(len(SEEDS))
     assert 0.90 <= shares.mean() <= 0.98, f"{shares.mean():.3f} +- {half:.3f} of {errors[name].size} intervals"
+
+
+@pytest.mark.parametrize(("periods", "group"), [(4, "period"), (1, "block")])
+def test_noise_of_parameters_is_that_of_refits_without_each_period_or_without_each_block_if_there_is_one(
+    periods, group
+):
+    """By the jackknife: the variance of P refits, times P - 1; in two logs, a period of both is left out."""
+    rng, k = np.random.default_rng(0), np.arange(1200)
+    number = {"period": k % 600 * periods // 600, "block": k % (600 // periods) * 6 * periods // 600}
+    Phi, log = rng.normal(size=(1200, 1, 2)), k // 600
+    tau = Phi @ [1.0, 2.0] + rng.normal(size=(1200, 1))
+    by_block = sum_equations(Phi, tau, 6 * log + number["block"], 12)
+    by_period = sum_equations(Phi, tau, 20 * log + number["period"], 40)
+    part = SimpleNamespace(by_block=by_block, by_period=by_period, ridge=Ridge(0.0, np.ones(1), np.empty((0, 0))))
+    groups = [number[group] == n for n in np.unique(number[group])]
+    thetas = np.array([np.linalg.lstsq(Phi[~out, 0], tau[~out, 0])[0] for out in groups])
+    expected = np.sqrt((len(groups) - 1) * thetas.var(axis=0))
+    np.testing.assert_allclose(model_error.std_over_periods(part, 2), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("variance", "explained"), [(4.0, 0.03), (1.0, 0.0), (0.5, 0.0)])

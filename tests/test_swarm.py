@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from davinci_forces.estimators import pso
+from davinci_forces.estimators import lse, pso
 from davinci_forces.estimators.problem import Prior, Regression
 from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation import kernels
@@ -56,6 +56,26 @@ def test_every_seed_finds_the_best_parameters_of_its_box(name, theta, known):
     excess = [search(R, box, seed).squares / best - 1 for seed in range(SEEDS)]
     assert max(excess) < 1e-6
     assert min(excess) > -1e-9
+
+
+def test_a_box_without_a_table_is_ten_standard_errors_around_least_squares():
+    p = problem("hand_roll", known=False)
+    p = replace(p, periods=np.arange(len(p.tau)) % 3, known=Prior())
+    box, plain = pso.box_around(triangle(p.Phi, p.tau, p.weight), p), lse.estimate(p)
+    for bound, side in ((box.lower, -10.0), (box.upper, 10.0)):
+        assert_allclose(bound, plain.theta + side * plain.standard_errors.classical, rtol=1e-9)
+
+
+def test_a_box_holds_the_best_parameters_of_known_signs_however_far_they_are_from_least_squares():
+    """Of two columns that are nearly alike, one must not be negative, which moves the other by 50 standard errors."""
+    random = np.random.default_rng(0)
+    Phi = random.normal(size=(400, 1)) + 0.1 * random.normal(size=(400, 2))
+    tau = Phi @ [-2.0, 3.0] + 0.1 * random.normal(size=400)
+    p = Regression(Phi, tau, np.full(400, 0.01), np.ones(400, int), (0,), ("a", "b"), Prior(np.array([True, False])))
+    R = triangle(Phi, tau, p.weight)
+    box, best = pso.box_around(R, p), solve_bounded(R, p.known.positive)
+    assert ((box.lower <= best) & (best <= box.upper)).all()
+    assert box.lower[0] == 0.0
 
 
 @pytest.mark.parametrize("name", JOINTS)

@@ -191,7 +191,7 @@ def test_what_is_kept_of_correlations_does_not_grow_with_the_study():
     [arm] = resolve.gather(few, robot)
     assert list(arm.source) == ["log-0", "log-1", "log-2"]
     [arm] = resolve.gather([replace(few[0], log=f"log-{i}") for i in range(100)], robot)
-    assert len(arm) == resolve.MAX_LOGS_CORRELATION
+    assert len(arm) == 20
     assert not list(resolve.gather([], robot))
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
-from davinci_forces.filters import FILTERS, MAX_NIS_RATIO, diverges, kalman, title, tracker
+from davinci_forces.filters import FILTERS, diverges, kalman, title, tracker
 from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
 from davinci_forces.maths.models.independent import regressor
@@ -337,5 +337,5 @@ def test_noise_that_doubles_is_followed_with_the_time_constant_of_the_window():
 def test_a_filter_diverges_where_two_squared_innovations_are_beyond_a_multiple_of_the_two_they_should_be(
     share, diverging
 ):
-    assert diverges(np.ones(50), 2.0 * MAX_NIS_RATIO * share) == diverging
+    assert diverges(np.ones(50), 2.0 * 50.0 * share) == diverging
     assert diverges(np.where(np.arange(50) == 7, np.nan, 1.0), 2.0)

@@ -115,6 +115,7 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     ]
     log = observe(records, (), 4.0, 0)
     at_once = log.rows(coupled())
+    assert np.diff(at_once[2]).min() == int(1 / T_S / (3 * 4.0))  # three samples a period of the cutoff
     monkeypatch.setattr("davinci_forces.maths.models.memory.PIECE_SAMPLES", 700)
     for piecewise, whole in zip(log.rows(coupled()), at_once, strict=True):
         assert_allclose(piecewise, whole, rtol=1e-9, atol=1e-12)

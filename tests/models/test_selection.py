@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
-from davinci_forces.identification.candidates import CandidatePart, Library
+from davinci_forces.identification.candidates import Candidate, CandidatePart, Library, share_parameters, weights_of
 from davinci_forces.identification.chosen import reason
 from davinci_forces.identification.observations import CellEquations, Observed
 from davinci_forces.identification.unseen import RefitModel
@@ -28,6 +28,7 @@ from davinci_forces.maths.selection import (
     standard_error,
     sum_equations,
 )
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import independent
 
@@ -167,6 +168,40 @@ def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse
     assert standard_error(results[1], results[0]) > 0.001
     named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
     assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits
+
+
+@pytest.mark.parametrize(("difference", "overfits"), [(0.9e-4, False), (1.1e-4, True)])
+def test_errors_that_differ_by_less_than_the_last_printed_digit_are_equal(difference, overfits):
+    results = [worth(0.1), worth(0.1 + difference)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
+    named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
+    assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits
+
+
+def test_an_inertia_has_to_be_positive_at_fifty_poses_of_each_log_or_at_all_of_a_shorter_one():
+    logs = [SimpleNamespace(block=np.zeros(n), records=[SimpleNamespace(q=np.arange(n))]) for n in (100, 40)]
+    model = SimpleNamespace(inertia_columns=lambda poses: poses[:, 0])
+    assert Library(model, tuple(logs), None).inertias.tolist() == [*range(0, 100, 2), *range(40)]
+
+
+@pytest.mark.parametrize(("variant", "ranks"), [(CHOSEN, [0, 1, 1]), ("coupled", [4, 2, 4])])
+def test_searched_models_of_shared_links_come_first_and_others_by_their_number_of_parameters(variant, ranks):
+    shared, alone = (SimpleNamespace(model=SimpleNamespace(efforts=e), columns=[0, 1]) for e in (("a", "b"), ("a",)))
+    parts = ((shared, alone), (alone,), (alone, alone))
+    assert [Candidate("", variant, "", of_candidate).rank for of_candidate in parts] == ranks
+
+
+def test_joints_weigh_by_the_variance_that_their_own_models_leave_and_without_any_not_at_all():
+    efforts = {"loud": (10.0 * TAU, PHI), "plain": (TAU, PHI), "none": (0.0 * TAU, PHI), "no column": (TAU, 0.0 * PHI)}
+    cells = [sum_equations(Phi, tau, CELL, CELLS) for tau, Phi in efforts.values()]
+    weights = weights_of([SimpleNamespace(by_block=each, ridge=PLAIN) for each in cells])
+    residual = TAU[:, 0] - PHI[:, 0] @ solve(cells[1].sum_cells(np.ones(CELLS, bool)), PLAIN._replace(strength=1e-3))
+    assert_allclose(weights, [0.01 / (residual @ residual), 1.0 / (residual @ residual), 0.0, 0.0], rtol=1e-9)
+
+
+def test_joints_share_links_if_there_are_several_and_each_has_an_effort():
+    plain, current = SimpleNamespace(effort=""), SimpleNamespace(effort="current")
+    robot = SimpleNamespace(joints=[plain, plain, current])
+    assert [share_parameters(robot, rows) for rows in ([0], [0, 1], [0, 2])] == [False, True, False]
 
 
 def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():

@@ -48,10 +48,9 @@ def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> tuple[Array
     for _ in range(MAX_STEPS_HUBER):
         residual = root * (problem.tau - problem.Phi @ theta)
         deviation = MAD_TO_STD * float(np.median(np.abs(residual[weight > 0])))
-        off = residual / max(deviation, tolerance / np.sqrt(len(residual)))
+        off = residual / max(deviation, tolerance)
         share = HUBER_K / np.maximum(np.abs(off), HUBER_K)
         before, theta = theta, factorise(problem, weight * share).theta
-        change = R.U @ ((theta - before) * R.scale)
-        if change @ change <= tolerance**2:
+        if np.linalg.norm(R.U @ ((theta - before) * R.scale)) <= tolerance:
             break
     return theta, off, deviation

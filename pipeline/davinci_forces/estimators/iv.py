@@ -28,7 +28,7 @@ def estimate(problem: Regression) -> Estimate:
     F = problem.Phi * root / R.scale
     parts = np.split(problem.Phi, problem.starts[1:])
     Z = np.concatenate([np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0) for part in parts])
-    Q, _ = np.linalg.qr(Z * root / R.scale)  # the scale of the instruments has no effect
+    Q, _ = np.linalg.qr(Z * root)  # which the scale of a column of Z does not change
     ZF = Q.T @ F
     if (condition := np.linalg.cond(ZF)) > MAX_CONDITION:
         alike = ", ".join(problem.names[i] for i in dependent_parameters(ZF, MIN_PART_NAMED))

@@ -170,7 +170,7 @@ def standard_errors_by(
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
     noise = residual if problem.noise is None else root * problem.noise
     variance, lags = correlated_variance(Q, noise, problem.starts, D, degrees)
-    return StandardErrors(classical, np.sqrt(variance), np.zeros(len(theta)) + problem.model_std, lags)
+    return StandardErrors(classical, np.sqrt(variance), np.full(len(theta), problem.model_std), lags)
 
 
 def standard_errors(

@@ -63,10 +63,10 @@ def refuse_noisy(problem: Regression, R: Triangle, C: Array) -> None:
 def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
     """Fit the scaled parameters (p,) with the effort's noise from their residual, at least `v_min`."""
     variance, axes = np.linalg.eigh(C)
-    variance = np.where(variance > EXACT * variance[-1], variance, 0.0)
+    variance = np.where(variance > EXACT * variance.max(), variance, 0.0)
     theta = R.theta * R.scale
-    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y + R.min_squares))
-    v = 0.0
+    floor = max(v_min, TOLERANCE_TLS * float(R.y @ R.y))
+    v = np.inf
     for _ in range(MAX_STEPS_TLS):
         squares = R.min_squares + float(((R.U @ theta - R.y) ** 2).sum())
         before, v = v, max(squares - float(theta @ C @ theta), floor)

@@ -75,14 +75,11 @@ def pool_variance(var: Array, M: NDArray[np.int64]) -> Array:
     degrees = np.maximum(M[:1] if M.min() == M.max() else M, 1) - 1.0
     half = min(int(np.ceil(DEGREES / max(float(np.median(degrees)), 1.0))) // 2, (len(var) - 1) // 2)
     window = 2 * half + 1  # samples, at most a period, whose end is next to its beginning
-    if len(degrees) == 1:
-        smooth = uniform_filter1d(var, window, mode="wrap")
-    else:
-        squares, freedom = (uniform_filter1d(x, window, mode="wrap") for x in (var * degrees, degrees))
-        smooth = squares / np.maximum(freedom, 1.0 / window)
+    squares, freedom = (uniform_filter1d(x, window, mode="wrap") for x in (var * degrees, degrees))
+    smooth = squares / np.maximum(freedom, 1.0 / window)
     return np.asarray(np.maximum(smooth, 1e-12 * var.mean(), out=smooth))
 
 
 def median_periods(M: NDArray[np.int64]) -> int:
     """Return the median number of periods (K,) over the samples with at least one."""
-    return int(M[0]) if M.min() == M.max() else int(np.median(M[M > 0]))
+    return int(M.max()) if M.min() == M.max() else int(np.median(M[M > 0]))

@@ -254,7 +254,8 @@ def weights_of(parts: Sequence[CandidatePart]) -> Array:
         total = sum_all(part.by_block)
         with suppress(np.linalg.LinAlgError):
             variance = total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0]
-            weights[i] = 1.0 / variance if variance else 0.0
+            if variance:
+                weights[i] = 1.0 / variance
     return weights
 
 
@@ -266,7 +267,7 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     NotIdentifiable
         If its velocity is 0 throughout, as far as noise lets one tell.
     """
-    ranges, squares, count = [0.0], 0.0, 0
+    ranges, squares, count = [], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
         record = log.records[i]

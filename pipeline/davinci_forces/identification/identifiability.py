@@ -112,7 +112,7 @@ def join_names(names: Sequence[str]) -> str:
 
 def percent(share: float) -> str:
     """Format a share in per cent."""
-    return f"{100.0 * share:.2g} %"
+    return f"{float(f'{100.0 * share:.2g}'):g} %"  # 100 rather than 1e+02
 
 
 def moving_with(joint: str, logs: Sequence[str], moves: Sequence[tuple[str, str]]) -> list[str]:

@@ -100,9 +100,10 @@ class Identified:
         if paths is None:
             return 1.0
         part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
-        others = [paths.source == log for log in dict.fromkeys(paths.source) if log != motion.log]
+        periods = dict(zip(paths.source.tolist(), paths.period.tolist(), strict=True))
         likenesses = [
-            likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows][0]))
-            for rows in others
+            likeness(motion.t[part], motion.q_measured[part], paths.q[paths.source == log], period)
+            for log, period in periods.items()
+            if log != motion.log
         ]
         return 1.0 - max([0.0, *likenesses]) ** 2

@@ -1,6 +1,5 @@
 """The robot that the analysis assumes: its kinematic chain, its links, and the workspace of its tip."""
 
-from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,7 +18,8 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
     links, worst = records[0], context.number("robot.worst_condition", 3)
     tabulated = not np.isnan(links.alpha).all()
     chain_kind = "a Denavit-Hartenberg chain" if tabulated else "a tree of links"
-    shared = max(Counter(links.moved_by[links.moved_by > 0].tolist()).values(), default=0) > 1
+    moved_by = [coordinate for coordinate in links.moved_by.tolist() if coordinate]
+    shared = len(set(moved_by)) < len(moved_by)
     parallelogram = (
         "The links of the parallelogram share a coordinate, so the tool pivots about a remote centre without a bearing "
         "there. "
@@ -36,9 +36,9 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
     )
     rows = []
     for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):
-        moved_by = f"$q_{coordinate}$" if coordinate else "–"
+        mover = f"$q_{coordinate}$" if coordinate else "–"
         numbers = context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4)
-        rows.append((literal(link), literal(parent), moved_by, *numbers))
+        rows.append((literal(link), literal(parent), mover, *numbers))
     header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
     caption = "Denavit-Hartenberg parameters and masses" if tabulated else "Joints and masses"
     yield Table(f"{caption} of the links.", header, tuple(rows), "links-table", "lllrrrrr")
