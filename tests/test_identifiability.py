@@ -144,7 +144,8 @@ def test_an_effort_against_the_motion_is_blamed_on_a_sign():
 def test_a_sign_is_blamed_on_half_of_the_friction_if_that_is_surely_negative():
     assert "correct the `sign`" in blamed([-0.45, 0.01, -0.37, 0.22], [0.01] * 4)
     assert "friction is not negative" in blamed([-0.45, 0.01, -0.37, -0.22], [0.01, 0.01, 0.19, 0.12])
-    assert "cannot be distinguished from 0" in blamed([-0.45, 0.01, -0.37, 0.22], [0.23, 0.01, 0.01, 0.01])
+    assert "correct the `sign`" in blamed([-0.45, 0.01, -0.37, 0.22], [0.23, 0.01, 0.01, 0.01])
+    assert "cannot be distinguished from 0" in blamed([-0.45, 0.01, 0.37, 0.22], [0.23, 0.01, 0.01, 0.01])
 
 
 def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_out():
