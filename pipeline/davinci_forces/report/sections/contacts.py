@@ -22,17 +22,17 @@ def section(context: Context) -> Iterator[Block]:
     if contacts:
         yield Prose(
             "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is "
-            "found there. The window of a contact is stated in study.toml. Otherwise it is the time in which the "
-            "smoothed external effort exceeds the alarm level, which free motion like that of the logs crosses at "
-            "most once in ten minutes, if the interval of the peak, without its flattening, does not hold zero. Onset "
-            "and release are the times at which the effort leaves zero and returns to it. The peak is the largest "
-            "external effort in the window. Mean and impulse (mean times time) are those of measured minus modelled "
-            "effort, which no smoothing moves out of the window, so the mean of a short push may exceed its peak. "
-            "Their standard errors are their spread over windows of the same length in free space; that of an impulse "
-            "includes those of onset and release if no window is stated. The standard error of a peak also includes "
-            "the smoother's standard deviation there, and the height by which smoothing flattens the peak. Peaks are "
-            "judged by the detection level, which is lower than the alarm level: 99 % of the samples of the "
-            f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
+            "found there. Its window is stated in study.toml, or is the time in which the smoothed external effort "
+            "exceeds the alarm level, if the interval of the peak, without its flattening, does not hold zero. Free "
+            "motion like that of the logs crosses this level at most once in ten minutes. Onset and release are the "
+            "times at which the effort leaves zero and returns to it. The peak is the largest external effort in the "
+            "window. Mean and impulse (mean times time) are those of measured minus modelled effort, which no "
+            "smoothing moves out of the window, so the mean of a short push may exceed its peak. Their standard errors "
+            "are their spread over windows of the same length in free space; that of an impulse includes those of "
+            "onset and release if no window is stated. That of a peak also includes the smoother's standard deviation "
+            "there, and the height by which smoothing flattens the peak. Peaks are judged by the lower detection "
+            "level: 99 % of the samples of the joint's worst run in free space stay below it. Alarm levels: "
+            f"{alarm_levels(context, contacts)}."
         )
         yield peaks(contacts)
         caption = (
