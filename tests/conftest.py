@@ -411,7 +411,10 @@ def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def typeset_once() -> Iterator[None]:
-    """Each page is typeset once a file of tests: where a report is made anew, it is nearly always the one that was."""
+    """Each page is typeset once a file of tests: where a report is made anew, it is nearly always the one that was.
+
+    Not where the same data have to give the same pages, in test_runs.py: a page that is remembered is the same anyhow.
+    """
     import typst
 
     compile_page, known = typst.compile_with_warnings, {}

@@ -27,7 +27,6 @@ from davinci_forces.runner.signature import stage_of
 from davinci_forces.stages import GROUPS, STAGES
 from tests.arm import write_robot, write_study
 
-pytestmark = pytest.mark.usefixtures("typeset_once")
 FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
 
 
