@@ -401,6 +401,19 @@ def test_the_value_of_a_peak_is_left_out_beside_a_larger_one(lab: Lab, catalogue
     assert shown.names == ("", "-2", "+0.5")
 
 
+def test_a_contact_log_decides_on_a_joint_where_its_windows_of_contact_or_free_of_it_are_stated(
+    lab: Lab, catalogue: Catalogue
+):
+    about = context(lab, catalogue)
+    [stated] = [log for log in about.study.logs if log.name == "push"]
+    assert stated.contact
+    for contact, free, counts in ((stated.contact, (), True), ((), ((1.0, 3.0),), True), ((), (), False)):
+        logs = tuple(replace(log, contact=contact, free=free) if log is stated else log for log in about.study.logs)
+        changed = replace(about, study=replace(about.study, logs=logs))
+        scored = {prediction.log for prediction in parts.scored_predictions(changed, "hand_roll")}
+        assert ("push" in scored) == counts
+
+
 @pytest.mark.parametrize("worst", ["push", "tip"])
 def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_only_if_stated(
     lab: Lab, catalogue: Catalogue, worst: str

@@ -83,10 +83,10 @@ def trust(context: Context, joint: str) -> Trust:
 
 
 def scored_predictions(context: Context, joint: str) -> list[Prediction]:
-    """The predictions of a joint by the fit that the filter uses, where a contact log says when it is touched."""
+    """The predictions of a joint by the fit that the filter uses, of logs of which some motion is known to be free."""
     fits = context.predicting_fits(joint)
     scored = [p for p in context.catalogue.select(Prediction, joint=joint) if f"{p.model}.{p.estimator}" in fits]
-    return [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
+    return [p for p in scored if p.role != "contact" or context.study.log(p.log).has_known_free_motion]
 
 
 def run_name(log: str, joint: str) -> str:

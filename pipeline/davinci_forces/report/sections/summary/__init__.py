@@ -137,8 +137,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         return f"{text} No contact is measured: {why}."
     peaks = largest_peaks(context, contacts)
     if not stated:
-        known = all(context.study.log(contact.log).has_known_free_motion for contact in contacts)
-        doubt = "" if known else " Small ones may be errors of the model: see [@contacts]."
+        is_free_known = all(context.study.log(contact.log).has_known_free_motion for contact in contacts)
+        doubt = "" if is_free_known else " Small ones may be errors of the model: see [@contacts]."
         return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**{doubt}"
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
