@@ -136,6 +136,21 @@ def test_damage_of_any_other_bag_is_refused_or_changes_no_more_than_what_it_hit(
                 assert np.count_nonzero(values != truth(name, MANY)[channel]) <= COUNT // 50
 
 
+@pytest.mark.parametrize("name", ["lz4.bag", "bz2.bag"])
+def test_a_compressed_chunk_of_another_size_or_of_other_bytes_is_refused(name):
+    content = bag(name)
+    chunk = content.index(b"op=\x05")
+    place = content.index(b"size=", chunk) + 5
+    [size] = struct.unpack_from("<I", content, place)
+    for wrong in (size - 1, size + 1):
+        resized = content[:place] + struct.pack("<I", wrong) + content[place + 4 :]
+        with pytest.raises(BadLog, match=f"a chunk holds {size} bytes instead of {wrong}"):
+            read(resized, name)
+    start = content.index({"lz4.bag": b"\x04\x22\x4d\x18", "bz2.bag": b"BZh"}[name], chunk)
+    with pytest.raises(BadLog, match="a chunk cannot be decompressed"):
+        read(content[:start] + b"?" + content[start + 1 :], name)
+
+
 def test_a_bag_of_ros_1_without_an_index_is_read_whole_and_said_to_be_so(tmp_path):
     content = bag("log.bag")
     index = content.index(b"index_pos=") + len(b"index_pos=")
