@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import least_squares
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
@@ -77,8 +78,7 @@ def why_not_positive(
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
     omitted = f"; this model leaves out the effects of {join_names(others)} in the same logs" if others else ""
     friction = np.array([term.positive for term in joint.terms]) & (inertia_coefficients == 0)
-    negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
-    if friction.any() and negative_friction.sum() * 2 >= friction.sum():
+    if are_negative(estimate.theta[friction], estimate.theta_std[friction]):
         text = f"{inertia}, and friction is negative, too: the effort opposes the motion"
         return f"{text}; correct the `sign` of the effort or of the position"
     if value > -MIN_Z * std:
@@ -90,6 +90,11 @@ def why_not_positive(
         return f"{text}{omitted}; record the joint by itself: {excite_command(robot, joint.name)}"
     causes = "effort and motion may be logged at different times, or friction acts as a spring at reversals"
     return f"{text}: {causes}"
+
+
+def are_negative(theta: Array, theta_std: Array) -> bool:
+    """Whether of some parameters, with their standard errors, at least half are significantly negative."""
+    return bool(len(theta) and 2 * np.count_nonzero(theta < -MIN_Z * theta_std) >= len(theta))
 
 
 def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:

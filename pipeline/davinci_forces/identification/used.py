@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from davinci_forces.errors import PipelineError
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
 from davinci_forces.maths.periods.shift import likeness
@@ -44,19 +44,18 @@ class Identified:
         i = self.model(fit).efforts.index(joint)
         return fit.cutoff[i], fit.effort_lag[i]
 
-    def friction_efforts(self, fit: Fit, joint: str) -> Array:
-        """Return the friction parameters of a joint that are efforts."""
+    def is_friction(self, fit: Fit, joint: str) -> Booleans:
+        """Select the parameters (p,) of a joint's friction that are efforts."""
         suffix = f" of {joint}" if len(self.model(fit).efforts) > 1 else ""
         effort = self.robot.joint(joint).unit("{effort}")
-        is_friction = [
-            "friction" in name and name.endswith(suffix) and unit == effort
-            for name, unit in zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
-        ]
-        return np.asarray(fit.theta[is_friction])
+        names_and_units = zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
+        return np.array(
+            ["friction" in name and name.endswith(suffix) and unit == effort for name, unit in names_and_units]
+        )
 
     def static_friction(self, fit: Fit, joint: str) -> float:
         """Return the largest friction of a joint at standstill: its friction parameters that are efforts, unsigned."""
-        return float(np.abs(self.friction_efforts(fit, joint)).sum())
+        return float(np.abs(fit.theta[self.is_friction(fit, joint)]).sum())
 
     def fits_of(self, joint: str) -> list[Fit]:
         """Return the fits of a joint's effort: its own, and those of its arm."""

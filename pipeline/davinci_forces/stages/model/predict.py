@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Iterator
 
 import numpy as np
 
+from davinci_forces.identification.identifiability import are_negative
 from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
 from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
@@ -196,7 +197,8 @@ def inertia_warning(motion: Motion, fit: Fit, identified: Identified) -> str:
     """State why the external effort of a joint is not estimated."""
     name, model = f"{motion.log}/{motion.joint}", f"{fit.model}.{fit.estimator}"
     text = f"{name}: the inertia of {model} is not positive along this log, so its external effort is not estimated"
-    if identified.friction_efforts(fit, motion.joint).sum() < 0.0:
+    friction = identified.is_friction(fit, motion.joint)
+    if are_negative(fit.theta[friction], fit.theta_std[friction]):
         return f"{text}; its friction is negative, too: correct the `sign` of its effort or of its position"
     return (
         f"{text}; the report may name the cause beside all fits of {motion.joint}: a motion that hardly excites it, a "
