@@ -221,7 +221,7 @@ def test_an_entry_of_another_shape_is_none(tmp_path, part):
     seal = f',\n "seal": "{hash_of_text(text)}"\n}}\n'
     (processed(study) / "tasks" / "ingest" / "one.json").write_text(text.removesuffix("\n}") + seal)
     assert "tasks/ingest/one.json was altered" in flat(call("verify", study, code=1)).replace("\\", "/")
-    assert "it has not run yet" in call("ingest", study)
+    assert "first run" in call("ingest", study)
     assert Ledger(Folders(study, processed(study), reports(study))).entry("ingest", "one") == honest
 
 

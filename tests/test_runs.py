@@ -96,7 +96,7 @@ def test_a_second_run_imports_no_statistics(finished):
 def test_a_dry_run_says_what_would_run_and_why_and_changes_nothing(study, finished):
     new = write_study(study.parent / "new")
     said = call("all", new, "--dry-run")
-    assert "design: would run: it has not run yet" in said
+    assert "design: would run: first run" in said
     assert "resample: waits for the results of ingest" in said
     assert not processed(new).exists()
     assert "would run" not in call("all", finished, "--dry-run")
@@ -275,7 +275,7 @@ def test_an_entry_that_somebody_altered_counts_for_nothing(finished):
     entry = processed(finished) / "tasks" / "average" / "roll.json"
     good = entry.read_bytes()
     entry.write_bytes(good.replace(b'"failed": ""', b'"failed": "x"'))
-    assert "average: roll: it has not run yet" in call("average", finished)
+    assert "average: roll: first run" in call("average", finished)
     assert "nothing to do" in call("all", finished)
     assert entry.read_bytes() == good
 
@@ -319,14 +319,14 @@ def ran(study: Path) -> set[str]:
 def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
     said = call("fit", study)
     assert ran(study) == {"ingest", "resample", "average", "differentiate", "fit"}
-    assert "fit: it has not run yet" in said
+    assert "fit: first run" in said
     again = call("fit", study).splitlines()[1:]
     assert again == ["fit: 5 of 5 up to date", f"{study}: nothing to do, all stages are up to date"]
 
 
 def test_a_group_of_a_fresh_study_runs_its_stages_and_what_they_need(study):
     said = call("model", study, "--dry-run")
-    assert "ingest: roll, slide, check and 1 more: would run: it has not run yet" in said
+    assert "ingest: roll, slide, check and 1 more: would run: first run" in said
     assert "predict: waits for" in said
     assert not [line for line in said.splitlines() if line.startswith(("design", "tune", "ekf", "report"))]
     assert davinci_forces.run(study, "model", quiet=True)
@@ -337,7 +337,7 @@ def test_what_a_stage_needs_runs_where_it_is_not_current_and_is_not_forced(finis
     tasks = processed(finished) / "tasks"
     (tasks / "average" / "slide.json").unlink()
     said = call("fit", finished, "--force").splitlines()[1:]
-    assert said[:2] == ["average: slide: it has not run yet", "fit: --force"]
+    assert said[:2] == ["average: slide: first run", "fit: --force"]
     assert not [line for line in said if line.startswith(("ingest", "resample", "differentiate"))]
 
 

@@ -57,8 +57,8 @@ def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finishe
     assert davinci_forces.run(finished, "tune")
     said = capsys.readouterr().out.splitlines()[1:]
     assert said == [
-        "tune: roll/hand_roll: it has not run yet",
-        "tune: gather: it has not run yet",
+        "tune: roll/hand_roll: first run",
+        "tune: gather: first run",
         "tune: 3 of 5 up to date",
     ]
 
@@ -67,9 +67,9 @@ def test_what_would_run_is_told_once_a_stage(finished):
     ledger = Ledger(folders(finished, None, None))
     ledger.place("tune", "check/hand_roll").unlink()  # which makes nothing, as it identifies nothing
     said = CliRunner().invoke(app, ["calibrate", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check/hand_roll: would run: it has not run yet", "calibrate: waits for the results of tune"]
+    assert said == ["tune: check/hand_roll: would run: first run", "calibrate: waits for the results of tune"]
     said = CliRunner().invoke(app, ["tune", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check/hand_roll: would run: it has not run yet", "tune: 4 of 5 up to date"]
+    assert said == ["tune: check/hand_roll: would run: first run", "tune: 4 of 5 up to date"]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,13 @@
 """Exceptions that the pipeline raises on purpose.  The command line prints them without a traceback."""
 
+import shlex
+import sys
+
+
+def install(package: str) -> str:
+    """The command that installs an optional package into the environment that runs."""
+    return f"{shlex.quote(sys.executable)} -m pip install {package}"
+
 
 class PipelineError(Exception):
     """The data, the study or the request is wrong; the message says where, and what to do."""

@@ -170,7 +170,7 @@ def test_a_folder_that_is_no_bag_and_a_description_without_its_folder_are_refuse
 def test_without_rosbags_the_message_says_how_to_install_it(tmp_path, monkeypatch):
     bag = write(tmp_path / "log.bag", states())
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(BadLog, match=r"pip install davinci-forces\[ros\]"):
+    with pytest.raises(BadLog, match=r"-m pip install rosbags$"):
         open_log(bag)
 
 

@@ -22,7 +22,7 @@ MAX_HEAD = 50  # rows above the first row of numbers
 MAX_UNPACKED = 1 << 30  # [bytes] of a workbook: a million rows of twenty columns
 
 Row = tuple[Any, ...]
-read = partial(isolated.read, reader=__name__, package="openpyxl", extra="xlsx")
+read = partial(isolated.read, reader=__name__, package="openpyxl")
 
 
 def recognises(path: Path, head: bytes) -> bool:

@@ -173,7 +173,7 @@ class Ledger:
     def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
         """Reasons to run a task; none if it is up to date."""
         if entry is None:
-            return ["it has not run yet"]
+            return ["first run"]
         if entry.failed:
             return ["it failed last time"]
         altered = [f"{name} was altered" for name, sha in entry.outputs.items() if self.digest(name) != sha]

@@ -120,7 +120,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     arms, why_not = (stated, []) if stated else candidates(folder)
     drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
     if not drawn:
-        what = "no log can be read, so no study is written; export the logs again, or name other files"
+        what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
     names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]

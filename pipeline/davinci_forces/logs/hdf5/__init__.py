@@ -7,7 +7,7 @@ from davinci_forces.logs import isolated
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MAY_BEGIN_AT = (0, 512, 1024, 2048)  # [bytes], after a user block
-read = partial(isolated.read, reader="davinci_forces.logs.hdf5.datasets", package="h5py", extra="hdf5")
+read = partial(isolated.read, reader="davinci_forces.logs.hdf5.datasets", package="h5py")
 
 
 def recognises(path: Path, head: bytes) -> bool:

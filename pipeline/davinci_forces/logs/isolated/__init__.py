@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.errors import BadLog
+from davinci_forces.errors import BadLog, install
 from davinci_forces.files import require_file
 from davinci_forces.logs.isolated.process import ChildEnded, Message, child
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
@@ -27,10 +27,10 @@ MAX_COMPRESSION = 2000  # size of the samples over that of the file, at most; th
 HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hold a few samples
 
 
-def read(path: Path, options: Options, reader: str, package: str = "", extra: str = "") -> Log:
+def read(path: Path, options: Options, reader: str, package: str = "") -> Log:
     """Open a log in a child process; `reader` is a module that exports `open_in_child(path, options) -> Log`.
 
-    It may need an optional package, which the extra of this name installs.
+    It may need an optional package, which not every installation has.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def read(path: Path, options: Options, reader: str, package: str = "", extra: st
         If that package is not installed, or the log cannot be read within the limits.
     """
     if package and find_spec(package) is None:
-        raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")
+        raise BadLog(f"{path}: {package}, which reads it, is not installed; run: {install(package)}")
     request = _request(path, options, reader)
     for message, _ in _answers(path, request):
         state = message

@@ -15,5 +15,5 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, options: Options) -> Log:
     """Open the file and list its variables; raises BadLog."""
     with open_file(path) as file:
-        needed = {"package": "h5py", "extra": "hdf5"} if file.read(10) == b"MATLAB 7.3" else {}
-    return isolated.read(path, options, reader="davinci_forces.logs.mat.variables", **needed)
+        package = "h5py" if file.read(10) == b"MATLAB 7.3" else ""
+    return isolated.read(path, options, reader="davinci_forces.logs.mat.variables", package=package)

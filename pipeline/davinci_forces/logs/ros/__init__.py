@@ -19,4 +19,4 @@ def read(path: Path, options: Options) -> Log:
     """Open the bag, and list its topics and their numbers; raises BadLog without rosbags, or at damage."""
     if path.is_file() and path.suffix == ".yaml":
         raise BadLog(f"{path}: this file describes a ROS 2 bag; name its folder instead, {path.parent}")
-    return isolated.read(path, options, reader="davinci_forces.logs.ros.bag", package="rosbags", extra="ros")
+    return isolated.read(path, options, reader="davinci_forces.logs.ros.bag", package="rosbags")

@@ -12,7 +12,7 @@ from platform import python_version
 from time import sleep
 from uuid import uuid4
 
-from davinci_forces.errors import BadRequest
+from davinci_forces.errors import BadRequest, install
 from davinci_forces.runner.execution import Outcome, perform
 from davinci_forces.runner.fingerprints.code import package_fingerprint
 from davinci_forces.runner.ledger import Folders
@@ -84,9 +84,7 @@ def connect(address: str, folders: Folders) -> Iterator[tuple[Executor, int, Ter
     try:
         from distributed import Client, KilledWorker, Security
     except ImportError:
-        raise BadRequest(
-            "--cluster needs Dask, which is not installed: python -m pip install 'davinci-forces[cluster]'"
-        ) from None
+        raise BadRequest(f"--cluster needs Dask, which is not installed; run: {install('distributed')}") from None
     try:
         if address.startswith("tls:") and not Security().get_connection_args("client")["ssl_context"]:
             names = "ca-file, client.cert and client.key"
