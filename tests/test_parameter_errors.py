@@ -109,11 +109,10 @@ def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in
     A parameter may be lacking: a slope is then 0, and of a spring nothing is known.
     """
     mass, *lacking = (("mass", 1.0), ("spring of roll", 1.0), ("stiffness, slope of roll", 1.0))
-    sums = dict(zip((mass, *lacking), np.eye(3), strict=True))
-    here = SimpleNamespace(sums=sums, C=np.eye(3), by_block=None, ridge=None)
-    there = SimpleNamespace(sums={mass: np.ones(1)}, C=variance * np.eye(1), by_block=None, ridge=None)
-    monkeypatch.setattr(model_error, "sums_to_compare", lambda part: part.sums)
-    monkeypatch.setattr(model_error, "unit_variance", lambda part: part.C)
+    here = SimpleNamespace(names=[mass, *lacking], variance=np.ones(3), by_block=None, ridge=None)
+    there = SimpleNamespace(names=[mass], variance=np.array([variance]), by_block=None, ridge=None)
+    monkeypatch.setattr(model_error, "identities", lambda part: part.names)
+    monkeypatch.setattr(model_error, "unit_variance", lambda part: part.variance)
     monkeypatch.setattr(model_error, "sum_all", lambda cells: cells)
     monkeypatch.setattr(model_error, "solve", lambda cells, ridge: np.array([2.5]))
     changes = model_error.squared_changes(here, np.array([2.0, 7.0, 3.0]), np.full(3, 0.1), there)

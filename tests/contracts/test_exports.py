@@ -16,7 +16,6 @@ from davinci_forces.exports.identified import SAFETY, export_of
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import pseudo_inertias
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.models.terms import presliding_friction
 from davinci_forces.records import Choice, JointModel, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
@@ -357,17 +356,6 @@ def test_a_negative_spring_or_friction_is_remarked_on_and_a_negative_offset_is_n
         for line in remarks:
             assert f"{term.name} is negative, -0.5 +- " in line
             assert all(line in text for text in files.values())
-
-
-@pytest.mark.parametrize(("presliding", "remarks"), [(0.4, 0), (0.05, 1)])
-def test_negative_coulomb_friction_drives_a_joint_unless_presliding_friction_outweighs_it(small, presliding, remarks):
-    joint = small.joints[0]
-    terms = [presliding_friction(0.01) if term.name == "viscous friction" else term for term in joint.model.terms]
-    values = {"Coulomb friction": -0.1, "presliding friction 1": presliding}
-    theta = np.array([values.get(term.name, 0.1) for term in terms])
-    fit = replace(joint.fit, parameter=np.array([term.name for term in terms]), theta=theta)
-    changed = joint._replace(fit=fit, model=replace(joint.model, terms=tuple(terms)))
-    assert len(replace(small, joints=(changed,)).remarks()) == remarks
 
 
 def test_a_urdf_needs_newtons_and_a_chain_and_a_log_of_the_whole_arm(small):

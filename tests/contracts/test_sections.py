@@ -241,21 +241,6 @@ def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_
     assert (verdict.level, "physically impossible" in verdict.text) == ("warn", True)
 
 
-def test_coulomb_friction_may_be_negative_beside_presliding_friction_that_outweighs_it(full: Context):
-    fit = full.own_fits()[0]
-    row = [str(name) for name in fit.parameter].index("Coulomb friction")
-    other = next(i for i in range(len(fit)) if i != row)
-    names = fit.parameter.copy()
-    names[other] = "presliding friction 1"
-    theta = np.full(len(fit), 0.5)
-    theta[row] = -0.2
-    values = {"parameter": names, "theta_std": np.full(len(fit), 0.01), "positive": np.ones(len(fit))}
-    assert not [*joints.implausible([replace(fit, theta=theta, **values)], fit.group)]
-    theta[other] = 0.1
-    [verdict] = joints.implausible([replace(fit, theta=theta, **values)], fit.group)
-    assert verdict.text.startswith("**Coulomb friction** is negative")
-
-
 def test_the_guide_explains_each_column_of_the_table_on_page_one(full: Context):
     table = summary.trust_table(full, [replace(trust, sought=0.5) for trust in trusts(full, hand_roll=0.05)])
     for head in table.header:

@@ -25,7 +25,7 @@ T_S = 0.005
 
 
 UNITS = {"inertia": "kg m^2", "effort": "N m", "position": "rad", "gain": ""}
-FRICTION = ((terms.viscous, terms.presliding_friction(0.02)), (terms.viscous, terms.coulomb))
+FRICTION = ((terms.viscous, terms.coulomb, terms.presliding_friction(0.02)), (terms.viscous, terms.coulomb))
 
 
 def coupled(rows=(0, 1), group="arm"):
@@ -52,7 +52,7 @@ def test_only_friction_that_depends_on_a_displacement_or_a_velocity_has_a_scale(
 
 
 ROTOR, SPRING, OFFSET = np.array([0.3, 0.2]), np.array([1.5, 0.0]), np.array([0.0, -0.4])
-OF_FRICTION = np.array([1.0, 0.5, 0.8, 0.3])
+OF_FRICTION = np.array([1.0, 0.5, 0.5, 0.8, 0.3])  # all friction of joint one builds up over a displacement
 
 
 def truth(model):
@@ -234,6 +234,22 @@ def test_a_term_of_an_unknown_function_or_without_its_displacement_is_refused():
         replace(DAHL, displacement=0.0)
     with pytest.raises(ValueError, match="one displacement"):
         replace(DAHL, width=0.1)
+
+
+@pytest.mark.parametrize("term", [terms.presliding_friction(1e-4), terms.smooth_sign(1e-3)], ids=lambda term: term.name)
+def test_friction_that_reverses_gradually_has_no_effort_at_speed_so_coulomb_friction_is_all_there(term):
+    motion, model = column(wandering(2000)), IndependentJoint("one", (terms.coulomb, term), ("N m", "N m"))
+    dq, theta, known = motion.dq[:, 0], np.array([0.8, 0.5]), model.regressor(motion).known
+    fast = known & (np.abs(dq) > 5e-3)
+    steady = (
+        np.abs(np.convolve(fast * np.sign(dq), np.ones(100))[: len(fast)]) == 100
+    )  # a travel of 5 displacements or more
+    assert steady.sum() > 300
+    assert_allclose(model.regressor(motion).Phi[steady, 0] @ theta, 0.8 * np.sign(dq[steady]), atol=5e-3)
+    dynamics = model.joint_dynamics(theta, motion)[0]
+    assert dynamics.coefficients[derivation.COULOMB] == pytest.approx(0.3)  # that reverses at once
+    effort = 0.3 * np.sign(dq) + dynamics.known
+    assert_allclose(effort, model.regressor(motion).Phi[:, 0] @ theta, atol=1e-12)
 
 
 def test_a_smooth_sign_and_stribeck_s_peak_are_the_sign_far_from_and_near_standstill():

@@ -21,7 +21,7 @@ from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.terms import Term, coulomb, inertia, offset, stiffness
+from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
@@ -102,10 +102,7 @@ class Export:
         return [visible(line) for line in lines]
 
     def remarks(self) -> list[str]:
-        """Name springs that are negative beyond their error, and negative parameters that physics makes positive.
-
-        Coulomb friction is named if its sum with presliding friction is negative.
-        """
+        """Name springs that are negative beyond their error, and negative parameters that physics makes positive."""
         advice = "in a simulation or a compensation it can drive the joint"
         return [
             f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
@@ -115,7 +112,6 @@ class Export:
             )
             if about.term and (about.term.positive or about.term == stiffness)
             if value < (-NORMAL_95 * std if about.term == stiffness else -SOLVER_ZERO)
-            if about.term != coulomb or sliding_friction(fit, model, about.joint) < 0.0
         ]
 
     def document(self) -> dict[str, Any]:
@@ -136,15 +132,6 @@ class Rendering(NamedTuple):
 
     files: dict[str, str]
     remarks: list[str]
-
-
-def sliding_friction(fit: Fit, model: Model, joint: str) -> float:
-    """The friction of a joint far from rest with the sign of its velocity: Coulomb, presliding and smooth add up."""
-    pairs = zip(terms_of(model), fit.theta.tolist(), strict=True)
-    of_joint = ((about.term, value) for about, value in pairs if about.joint == joint)
-    return sum(
-        (value for term, value in of_joint if term and (term == coulomb or term.displacement or term.width)), 0.0
-    )
 
 
 def terms_of(model: Model) -> list[ModelTerm]:

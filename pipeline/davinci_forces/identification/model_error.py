@@ -14,13 +14,13 @@ For white noise s_i^2 = s_noise^2 (C_i / C - 1), C the inverse of Phi' Phi.
 """
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart, identity
 from davinci_forces.maths.arrays import Array, Integers
-from davinci_forces.maths.models.model import Parameter
-from davinci_forces.maths.models.terms import coulomb, offset
+from davinci_forces.maths.models.terms import offset
 from davinci_forces.maths.selection import (
     CLEARLY,
     MAX_GROUPS,
@@ -37,7 +37,6 @@ from davinci_forces.maths.selection import (
 )
 from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
-SLIDING = ("presliding friction", "smooth friction")  # at speed equal to Coulomb friction
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
@@ -58,19 +57,21 @@ def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: 
 
     A slope or curvature that the model lacks is 0 there.  Of any other parameter that it lacks, the change is NaN.
     """
-    theirs, theta_of_model = sums_to_compare(model), solve(sum_all(model.by_block), model.ridge)
-    C, C_of_model, squares = unit_variance(part), unit_variance(model), np.full(len(theta), np.nan)
-    for i, (name, a) in enumerate(sums_to_compare(part).items()):
-        lacking = np.zeros(len(theta_of_model)) if name[0].partition(" of ")[0].endswith(WITHOUT_TERM_0) else None
-        if (b := theirs.get(name, lacking)) is not None:
-            by_noise = noise_std[i] ** 2 * max(b @ C_of_model @ b / (a @ C @ a) - 1.0, 0.0)
-            squares[i] = (b @ theta_of_model - a @ theta) ** 2 - by_noise
+    names, theta_of_model = identities(model), solve(sum_all(model.by_block), model.ridge)
+    variance, variance_of_model, squares = unit_variance(part), unit_variance(model), np.full(len(theta), np.nan)
+    for i, name in enumerate(identities(part)):
+        if name in names:
+            k = names.index(name)
+            by_noise = noise_std[i] ** 2 * max(variance_of_model[k] / variance[i] - 1.0, 0.0)
+            squares[i] = (theta_of_model[k] - theta[i]) ** 2 - by_noise
+        elif name[0].partition(" of ")[0].endswith(WITHOUT_TERM_0):
+            squares[i] = theta[i] ** 2
     return squares
 
 
 def unit_variance(part: CandidatePart) -> Array:
-    """Compute the covariance (p, p) of a model's parameters under white noise of variance 1 in its weighted efforts."""
-    return covariance(sum_all(part.by_block), part.ridge, 1.0 / part.ridge.weights)
+    """Compute the variance (p,) of a model's parameters under white noise of variance 1 in its weighted efforts."""
+    return np.diag(covariance(sum_all(part.by_block), part.ridge, 1.0 / part.ridge.weights))
 
 
 def std_over_blocks(part: CandidatePart, logs: int) -> Array:
@@ -99,10 +100,8 @@ def other_models(
     same = [p for p in parts if p.model.efforts == part.model.efforts]
     schemes = schemes_of(part.library.cells.scored.squares, logs)
     for model in (more for p in same for more in with_offset(p)):
-        try:
+        with suppress(np.linalg.LinAlgError):
             yield model, LeftOut(model.by_block, schemes, model.score_cells).cross_validate(model.ridge)
-        except np.linalg.LinAlgError:
-            continue
 
 
 def with_offset(part: CandidatePart) -> Iterator[CandidatePart]:
@@ -114,13 +113,6 @@ def with_offset(part: CandidatePart) -> Iterator[CandidatePart]:
         yield part._replace(columns=[*part.columns, names.index(offset.name)], ridge=ridge)
 
 
-def sums_to_compare(part: CandidatePart) -> dict[tuple[str, float], Array]:
-    """Return the sum (p,) of parameters that each stands for, by name and scale: itself, or friction at speed."""
-    parameters = [part.library.model.parameters[i] for i in part.columns]
-    return {identity(p): np.array([float(q is p or is_part_of(q, p)) for q in parameters]) for p in parameters}
-
-
-def is_part_of(friction: Parameter, parameter: Parameter) -> bool:
-    """Whether a friction term has at speed the effect of another parameter, the Coulomb friction of the same joint."""
-    name, _, joint = parameter.name.partition(" of ")
-    return name == coulomb.name and friction.name.startswith(SLIDING) and friction.name.partition(" of ")[2] == joint
+def identities(part: CandidatePart) -> list[tuple[str, float]]:
+    """Return the name and the scale of each parameter of a part."""
+    return [identity(part.library.model.parameters[i]) for i in part.columns]

@@ -16,6 +16,7 @@ from davinci_forces.robots.models import ARM, model_of
 from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
+STATIC_FRICTION = ("Coulomb friction", "Stribeck friction")  # parameters that add up at standstill
 
 
 class Identified:
@@ -45,12 +46,15 @@ class Identified:
         return fit.cutoff[i], fit.effort_lag[i]
 
     def is_friction(self, fit: Fit, joint: str) -> Booleans:
-        """Select the parameters (p,) of a joint's friction that are efforts."""
+        """Select the parameters (p,) of a joint's friction that are efforts and add up at standstill."""
         suffix = f" of {joint}" if len(self.model(fit).efforts) > 1 else ""
         effort = self.robot.joint(joint).unit("{effort}")
         names_and_units = zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
         return np.array(
-            ["friction" in name and name.endswith(suffix) and unit == effort for name, unit in names_and_units]
+            [
+                name.startswith(STATIC_FRICTION) and name.endswith(suffix) and unit == effort
+                for name, unit in names_and_units
+            ]
         )
 
     def static_friction(self, fit: Fit, joint: str) -> float:

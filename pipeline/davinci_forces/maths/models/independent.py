@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import Coefficients, bias
+from davinci_forces.maths.models.bias import COULOMB, Coefficients, bias
 from davinci_forces.maths.models.memory import efforts, friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
@@ -87,10 +87,13 @@ class IndependentJoint:
         return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
-        """Terms of q, dq and ddq as inertia and coefficients; friction with a state z as known effort."""
+        """Functions of q, dq and ddq as inertia and coefficients; states z of friction as known effort."""
         c = bias_coefficients(self.terms, theta)
-        of_z = [theta_i * term.has_z for theta_i, term in zip(theta, self.terms, strict=True)]
-        known_effort = efforts(self, np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
+        of_z = theta * np.array([term.has_z for term in self.terms])
+        known_effort = np.zeros(len(motion.q))
+        if of_z.any():
+            known_effort = efforts(self, of_z, motion)[:, 0]
+            known_effort -= bias_coefficients(self.terms, of_z)[COULOMB] * np.sign(motion.dq[:, 0])
         return (JointDynamics(np.broadcast_to(inertia_of(self.terms, theta), len(motion.q)), c, known_effort),)
 
 
@@ -116,6 +119,5 @@ def inertia_of(terms: Sequence[Term], theta: Array) -> float:
 
 
 def bias_coefficients(terms: Sequence[Term], theta: Array) -> Coefficients:
-    """Coefficients of b = sum_i theta_i b_i, for `bias`, without terms of z."""
-    rows = np.array([term.coefficients if not term.has_z else np.zeros(7) for term in terms])
-    return tuple((np.asarray(theta) @ rows).tolist())
+    """Coefficients of b = sum_i theta_i b_i, for `bias`, without z."""
+    return (*(np.asarray(theta) @ [term.coefficients for term in terms]).tolist()[:-1], 0.0)

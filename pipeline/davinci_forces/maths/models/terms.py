@@ -89,13 +89,19 @@ stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 
 def presliding_friction(displacement: float, number: int = 1) -> Term:
-    """Presliding friction, which reverses within a displacement in the joint's units; several terms count from 1."""
-    return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
+    """The share of Coulomb friction that reverses within a displacement in the joint's units, not at once.
+
+    Its effort is 0 far from a reversal.  Several such terms count from 1.
+    """
+    phi = f'(z_{number} - op("sign")(dot(q)))'
+    b = {"z": 1.0, "sign(dq)": -1.0}
+    return Term(f"presliding friction {number}", phi, "{effort}", b=b, displacement=displacement)
 
 
 def smooth_sign(width: float) -> Term:
-    """Friction that reverses within velocities of +- `width`, in the joint's units."""
-    return Term("smooth friction", 'tanh(dot(q) \\/ dot(q)_"w")', "{effort}", b={"z": 1.0}, width=width)
+    """The share of Coulomb friction that reverses within velocities of +- `width`, not at once; 0 at higher speed."""
+    phi = '(tanh(dot(q) \\/ dot(q)_"w") - op("sign")(dot(q)))'
+    return Term("smooth friction", phi, "{effort}", b={"z": 1.0, "sign(dq)": -1.0}, width=width)
 
 
 def stribeck(decay_velocity: float) -> Term:

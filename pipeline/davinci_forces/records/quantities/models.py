@@ -65,7 +65,7 @@ MODELS = {
         "1 where no model is scored: at standstill, and as a controller starts or stops; 2 where only a missing sample "
         "was filled in; else 0"
     ),
-    "static_friction": Quantity("largest friction at standstill: Coulomb, Stribeck and presliding", "{effort}"),
+    "static_friction": Quantity("largest friction at standstill: Coulomb and Stribeck", "{effort}"),
     "gaps": Quantity("interruptions of the recording"),
     "method": Quantity("method of resampling to a uniform clock", ""),
     "velocity": Quantity("source of the velocity", ""),

@@ -15,7 +15,6 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
-    Number,
     OnScreen,
     Panel,
     Prose,
@@ -33,7 +32,6 @@ from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
 
-SIGNED_FRICTION = ("Coulomb friction", "presliding friction", "smooth friction")  # with the sign of the velocity
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
 
 
@@ -96,16 +94,6 @@ def equation(joint: str, fit: Fit) -> Equation:
     return Equation(f"tau = {' + '.join(terms)}", f"effort is the sum of {', '.join(names)}, each times its parameter")
 
 
-def sliding_friction(joint: str, fit: Fit) -> str:
-    """State the friction far from rest, where the terms that change sign with the velocity add up; "" if one does."""
-    names = {i: str(fit.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(fit, joint)}
-    rows = [i for i, name in names.items() if name.startswith(SIGNED_FRICTION) and "," not in name]
-    if len(rows) < 2:
-        return ""
-    effort = Number(float(fit.theta[rows].sum()), format_unit(str(fit.unit[rows[0]])), digits=3)
-    return f" Far from rest, {' and '.join(names[i] for i in rows)} add up to {effort}."
-
-
 def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
     """State what distinguishes the model in use from the joint by itself, and what it gains on unseen data."""
     base = {str(name) for name in plain.parameter}
@@ -137,17 +125,11 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
 
 
 def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
-    """Each parameter that fits make negative although it is positive in every mechanism, once for all fits.
-
-    Coulomb friction and presliding friction add up: one may be negative where their sum is not.
-    """
+    """Each parameter that fits make negative although it is positive in every mechanism, once for all fits."""
     values: dict[str, list[tuple[float, float, str]]] = {}
     for fit in fits:
-        rows = of_joint(fit, joint)
-        sliding = [i for i in rows if str(fit.parameter[i]).startswith(("Coulomb friction", "presliding", "smooth"))]
-        for i in rows:
-            adds_up = i in sliding and fit.theta[sliding].sum() > 0
-            if fit.theta[i] < 0 and fit.positive[i] and not adds_up:
+        for i in of_joint(fit, joint):
+            if fit.theta[i] < 0 and fit.positive[i]:
                 name = str(fit.parameter[i]).removesuffix(f" of {joint}")
                 values.setdefault(name, []).append((fit.theta[i], fit.theta_std[i], title_of(fit.estimator)))
     for name, negative in values.items():
@@ -169,7 +151,7 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
-        f"Mean squared error of the effort{whose}: {mse}.{sliding_friction(joint, fit)}{coupled}"
+        f"Mean squared error of the effort{whose}: {mse}.{coupled}"
     )
     return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
 
