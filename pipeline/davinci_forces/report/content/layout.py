@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from davinci_forces.report.content.document import (
+from davinci_forces.report.content import (
     Block,
     Bullets,
     Cell,
