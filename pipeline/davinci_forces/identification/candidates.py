@@ -254,10 +254,7 @@ def weights_of(parts: Sequence[CandidatePart]) -> Array:
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     """Return the range and the speed of a joint's motion, over all logs that move it.
 
-    Raises
-    ------
-    NotIdentifiable
-        If its velocity is 0 throughout, as far as noise lets one tell.
+    Raises NotIdentifiable if its velocity is 0 throughout, as far as noise lets one tell.
     """
     ranges, squares, count = [], 0.0, 0
     for log in logs:

@@ -73,10 +73,7 @@ class Identified:
     def fit_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
         """Return the fit of a joint along a log with the joints `held`, and why it replaces the fit of the setting.
 
-        Raises
-        ------
-        PipelineError
-            If there is no fit of that name.
+        Raises PipelineError if there is no fit of that name.
         """
         fit, stand_in = self.fit_of(joint, setting), self.fit_of(joint, FALLBACK)
         if fit is None:

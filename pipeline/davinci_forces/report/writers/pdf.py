@@ -18,12 +18,7 @@ Json = dict[str, Any]
 def render(document: content.Document) -> bytes:
     """The whole file; the same document gives the same bytes.
 
-    Raises
-    ------
-    ValueError
-        If a reference leads nowhere.
-    NotTypeset
-        If Typst fails or warns.
+    Raises ValueError if a reference leads nowhere.  Raises NotTypeset if Typst fails or warns.
     """
     placed = number_blocks(document)
     data = {

@@ -51,11 +51,8 @@ MAX_LISTED_STRETCHES = 3  # in a remark
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
     """Make one Signal and one Motion of a recording.  A gap starts a new segment and is not interpolated across.
 
-    Raises
-    ------
-    BadLog
-        If no segment between gaps holds more than a few samples, velocity and position contradict each other, or the
-        motion lies far beyond the joint's limits.
+    Raises BadLog if no segment between gaps holds more than a few samples, velocity and position contradict each other,
+    or the motion lies far beyond the joint's limits.
     """
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
     cuts = (np.flatnonzero(are_gaps(recording.t, T_s)) + 1).tolist()
@@ -133,10 +130,7 @@ def velocity_faults(
 ) -> Iterator[str]:
     """State where a logged velocity differs from the derivative of the logged position, both low-passed.
 
-    Raises
-    ------
-    BadLog
-        If one is several times the other.
+    Raises BadLog if one is several times the other.
     """
     if recording.velocity == "derived" or not (moves(q, joint) or moves(np.cumsum(dq - dq.mean()) / rate, joint)):
         return
@@ -170,10 +164,7 @@ def median_ratio(x: Column, reference: Column) -> float:
 def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[str]:
     """State where low-passed positions and velocities lie beyond the joint's limits.
 
-    Raises
-    ------
-    BadLog
-        If they lie so far beyond that no motion of this joint is like that.
+    Raises BadLog if they lie so far beyond that no motion of this joint is like that.
     """
     beyond, largest = [], 0.0
     names = ("positions", "{position}"), ("velocities", "{position}/s")
