@@ -99,12 +99,6 @@ def moves(q: Column, joint: Joint) -> bool:
     return reach > MIN_MOTION * (high - low if np.isfinite(high - low) else 1.0)
 
 
-def slow_velocity(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
-    """Velocity (N,) of a low-passed position (N,), segment by segment."""
-    slow = lowpass_segments(q, segment, rate, cutoff)
-    return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
-
-
 def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
     """The Motion of a joint, also of one at rest, which other joints may drive; the low-pass removes its noise."""
     q, dq, ddq = smooth
@@ -135,7 +129,9 @@ def velocity_faults(
     if recording.velocity == "derived" or not (moves(q, joint) or moves(np.cumsum(dq - dq.mean()) / rate, joint)):
         return
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
-    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), slow_velocity(q, segment, rate, cutoff))
+    slow = lowpass_segments(q, segment, rate, cutoff)
+    derived = np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
+    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), derived)
     if abs(ratio - 1) < MAX_VELOCITY_ERROR:
         return
     hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
