@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.periods import averaging, harmonics, period
+from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.records import Average, Diagnostic, PeriodResidual
 from davinci_forces.stages.recordings import average
 from davinci_forces.study import LogEntry
@@ -32,9 +33,9 @@ def test_a_period_of_any_length_is_found_to_its_stated_uncertainty(length, seed,
     amplitudes = np.array([1.0, 0.5, 0.7])
     angles = 2 * np.pi * np.outer(t, [1, 2, 3]) / length + phase
     x = np.sin(angles) @ amplitudes + 0.02 * rng.normal(size=len(t))
-    guess = period.guess([x])
-    assert guess is not None
-    found = period.refine(t, [x], guess / 100, 3)
+    match = repetition([x])
+    assert match is not None
+    found = period.refine(t, [x], match.lag / 100, 3)
     assert abs(found - length) < 6 * period.standard_error(t, [x], found, 3)
 
 
@@ -46,11 +47,11 @@ def test_a_motion_that_nearly_repeats_within_its_period_keeps_the_whole_of_it(am
     t = np.arange(round(5.2 * length * 100)) / 100
     x = sum(a * np.sin(2 * np.pi * (k + 1) * t / length + k) for k, a in enumerate(amplitudes))
     x = x + 1e-3 * np.random.default_rng(0).normal(size=len(t))
-    assert period.guess([x]) / 100 == pytest.approx(length, rel=2e-3)
+    assert repetition([x]).lag / 100 == pytest.approx(length, rel=2e-3)
 
 
 def test_noise_has_no_period():
-    assert period.guess([np.random.default_rng(0).normal(size=4000)]) is None
+    assert repetition([np.random.default_rng(0).normal(size=4000)]) is None
 
 
 def test_the_stated_deviation_of_a_period_is_that_of_its_errors():
@@ -238,10 +239,11 @@ def test_evenly_sampled_harmonics_are_those_of_any_times(samples, rate, start):
     omega, H = 2 * np.pi / 10.3, 9
     x = np.sin(omega * t) + np.random.default_rng(1).normal(size=samples)
     F = harmonics.basis(t, omega, H)
-    c = harmonics.project(t, x, omega, H)
+    even = harmonics.Harmonics(t, omega, H)
+    c = even.project(x)
     assert harmonics.even_step(t) == pytest.approx(1 / rate)
     assert_allclose(c, np.linalg.lstsq(F, x, rcond=None)[0], atol=1e-12)
-    assert_allclose(harmonics.evaluate(c, t, omega), F @ c, atol=1e-11)
+    assert_allclose(even.evaluate(c), F @ c, atol=1e-11)
 
 
 def test_times_with_a_gap_or_a_shift_are_not_even():

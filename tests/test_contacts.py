@@ -9,7 +9,6 @@ from scipy.signal import lfilter
 
 from davinci_forces.maths.contact.detection import (
     FALSE_ALARMS,
-    FreeMotionStatistics,
     alarm_level,
     events,
     free_motion_statistics,
@@ -72,12 +71,12 @@ def noise(seed=0, std=0.1):
 def test_levels_of_white_noise_are_those_of_the_normal_distribution():
     found = levels(noise(), np.full(len(T), 0.1))
     # The density at the 99 % level is 0.0578 / 0.2 of |x|: a quantile's standard error is sqrt(p (1 - p) / N) over it.
-    assert found.rms == pytest.approx(0.1, abs=4 * 0.1 / np.sqrt(2 * len(T)))
-    assert found.level_95 == pytest.approx(0.196, abs=0.012)
-    assert found.level_99 == pytest.approx(0.2576, abs=0.02)
+    assert found.free_rms == pytest.approx(0.1, abs=4 * 0.1 / np.sqrt(2 * len(T)))
+    assert found.free_level == pytest.approx(0.196, abs=0.012)
+    assert found.detection_level == pytest.approx(0.2576, abs=0.02)
     assert found.coverage == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / len(T)))
     assert found.coverage_std == pytest.approx(np.sqrt(0.95 * 0.05 / len(T)), rel=0.5)
-    assert found.rms_std == pytest.approx(0.1 / np.sqrt(2 * len(T)), rel=0.5)
+    assert found.free_rms_std == pytest.approx(0.1 / np.sqrt(2 * len(T)), rel=0.5)
 
 
 def test_a_band_that_is_half_as_wide_covers_two_thirds():
@@ -347,12 +346,11 @@ def test_free_motion_crosses_the_alarm_level_as_seldom_as_it_says():
     """Ten hours of normal noise: one upward crossing of either sign in ten minutes each, by Rice's formula."""
     x = slow_noise(1.0, 0, 3_600_000)
     space = free_motion_statistics(x, np.ones(len(x), bool), RATE)
-    level = alarm_level([space._replace(largest=0.0)])
+    level = alarm_level(space.rms, 0.0, space.crossings)
     crossings = np.sum((x[:-1] < level) & (x[1:] >= level))
     expected = len(x) / RATE * FALSE_ALARMS
     assert abs(crossings - expected) < 4 * np.sqrt(expected)
-    statistics = [FreeMotionStatistics(0.1, largest, 0.3) for largest in (0.2, 5.0)]
-    assert alarm_level(statistics) == 5.0  # the largest that occurred
+    assert alarm_level(0.1, 5.0, 0.3) == 5.0  # the largest that occurred
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -611,7 +609,7 @@ def test_an_offset_drifts_where_its_halves_differ_by_more_than_two_standard_erro
 
 def test_the_alarm_level_is_that_of_rice_and_at_least_the_largest_effort():
     for crossings, logarithm in ((2.0, np.log(1200.0)), (1 / 600, 0.0), (1 / 6000, 0.0)):
-        level = alarm_level([FreeMotionStatistics(0.3, 0.01, crossings)])
+        level = alarm_level(0.3, 0.01, crossings)
         assert level == pytest.approx(max(0.01, 0.3 * np.sqrt(2.0 * logarithm)), rel=1e-12)
     sine = 0.7 * np.sin(2 * np.pi * 1.5 * T + 0.05)
     free = (T < 10.0) | (T >= 30.0)  # it crosses zero 15 times in 10 s, each last time just before a window or its end

@@ -42,7 +42,7 @@ LISTS = {  # extension folder -> its choices
 EXPORTED = {  # extension folder -> the name that a choice exports
     "robots": "ROBOT",
     "estimators": "estimate",
-    "filters": "track",
+    "filters": "blocks",
     "logs": "recognises",
     "report.sections": "section",
     "report.writers": "render",

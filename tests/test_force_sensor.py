@@ -56,19 +56,21 @@ def test_errors_are_those_of_the_noise_that_was_put_in_and_most_bands_hold():
     f = np.sin(np.arange(N) / 300.0)[:, None] * [2.0, -1.0, 4.0]
     estimated = f + random.normal(0.0, sigma, (N, 3)) + [0.1, 0.0, 0.0]
     of = errors(estimated, np.broadcast_to(np.diag(sigma**2 + [0.01, 0, 0]), (N, 3, 3)), f)
-    assert of.rmse == pytest.approx(math.sqrt(0.01 + (sigma**2).sum()), abs=4 * of.rmse_std)
-    assert of.bias == pytest.approx(0.1, abs=4 * of.bias_std)
-    assert of.span == pytest.approx(np.mean([4.0, 2.0, 8.0]), rel=1e-3)
-    assert of.relative == pytest.approx(np.mean([math.hypot(0.3, 0.1), 0.2, 0.5]) / of.span, abs=4 * of.relative_std)
-    assert of.coverage == pytest.approx(0.95, abs=0.01)
+    assert of.force_error == pytest.approx(math.sqrt(0.01 + (sigma**2).sum()), abs=4 * of.force_error_std)
+    assert of.force_bias == pytest.approx(0.1, abs=4 * of.force_bias_std)
+    assert of.force_range == pytest.approx(np.mean([4.0, 2.0, 8.0]), rel=1e-3)
+    relative = np.mean([math.hypot(0.3, 0.1), 0.2, 0.5]) / of.force_range
+    assert of.force_relative_error == pytest.approx(relative, abs=4 * of.force_relative_error_std)
+    assert of.sensor_coverage == pytest.approx(0.95, abs=0.01)
     one = errors(estimated[:, 1:2], np.full((N, 1, 1), 0.04), f[:, 1:2])
-    assert one.coverage == pytest.approx(0.95, abs=4 * one.coverage_std)
-    assert errors(estimated[:, 1:2], np.full((N, 1, 1), 0.01), f[:, 1:2]).coverage == pytest.approx(0.6727, abs=0.02)
+    assert one.sensor_coverage == pytest.approx(0.95, abs=4 * one.sensor_coverage_std)
+    narrow = errors(estimated[:, 1:2], np.full((N, 1, 1), 0.01), f[:, 1:2])
+    assert narrow.sensor_coverage == pytest.approx(0.6727, abs=0.02)
 
 
 def test_a_bias_along_one_axis_keeps_its_sign():
     f = np.sin(T)[:, None]
-    assert errors(f - 0.5, np.ones((len(T), 1, 1)), f).bias == pytest.approx(-0.5)
+    assert errors(f - 0.5, np.ones((len(T), 1, 1)), f).force_bias == pytest.approx(-0.5)
 
 
 def test_a_sensor_is_not_read_across_a_gap_or_beyond_its_ends():
@@ -225,9 +227,9 @@ def test_a_band_of_three_axes_is_an_ellipsoid_and_the_largest_error_has_the_devi
         reach_of = 1.0 / np.sqrt(along @ np.linalg.inv(sigma[:k, :k]) @ along)
         sizes = limit * reach_of * np.where(np.arange(400) < 100, 1.001, 0.999)
         found = errors(sizes[:, None] * along, C, np.zeros((400, k)))
-        assert found.coverage == 0.75
-        assert found.largest == pytest.approx(sizes[0], rel=1e-9)
-        assert found.largest_std == pytest.approx(np.sqrt(along @ sigma[:k, :k] @ along), rel=1e-9)
+        assert found.sensor_coverage == 0.75
+        assert found.force_error_max == pytest.approx(sizes[0], rel=1e-9)
+        assert found.force_error_max_std == pytest.approx(np.sqrt(along @ sigma[:k, :k] @ along), rel=1e-9)
 
 
 @pytest.mark.parametrize(

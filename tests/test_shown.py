@@ -92,8 +92,7 @@ def test_a_run_and_its_pages_show_them(hostile, tmp_path):
 
 
 def test_labels_of_figures_show_them():
-    from davinci_forces.report.content import Figure
-    from davinci_forces.report.content.document import Panel
+    from davinci_forces.report.content import Figure, Panel
     from davinci_forces.report.content.marks import Line
     from davinci_forces.report.figures.svg import svg
 

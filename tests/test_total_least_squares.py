@@ -15,7 +15,7 @@ from davinci_forces.identification.scores import select_logs
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.maths.periods.harmonics import derivative, evaluate, kept_noise, project
+from davinci_forces.maths.periods.harmonics import Harmonics, derivative, kept_noise
 from davinci_forces.records import Diagnostic, Fit
 from davinci_forces.robots.models import independent
 from davinci_forces.stages.model import fit
@@ -135,11 +135,11 @@ def test_the_derivatives_of_the_regressor_are_those_of_finite_differences():
 def test_harmonics_keep_as_much_noise_as_is_said():
     H, omega, sigma, draws = 3, 2 * np.pi / PERIOD, 0.1, 4000
     rng, at = np.random.default_rng(0), T[[17]]
-    kept = []
+    averaged, there, kept = Harmonics(T[::8], omega, H), Harmonics(at, omega, H), []
     for _ in range(draws):
-        c = project(T[::8], sigma * rng.normal(size=K // 8), omega, H)
+        c = averaged.project(sigma * rng.normal(size=K // 8))
         dc = derivative(c, omega)
-        kept.append([float(evaluate(x, at, omega)[0]) for x in (c, dc, derivative(dc, omega))])
+        kept.append([float(there.evaluate(x)[0]) for x in (c, dc, derivative(dc, omega))])
     expected = kept_noise(sigma, K // 8, H, omega)
     size = np.sqrt(np.diag(expected))
     assert_allclose(np.cov(np.array(kept).T) / np.outer(size, size), expected / np.outer(size, size),
@@ -154,11 +154,12 @@ def test_noise_of_averaged_positions_comes_to_the_columns_as_is_said():
     t = replace(t, sigma_q=1e-2)
     clean, sum_of = model.regressor(averaged_motion(t)).Phi[:, 0], 0.0
     omega = 2 * np.pi / t.period
+    kept = Harmonics(t.t, omega, t.harmonics)
     for _ in range(draws):
-        c = project(t.t, t.sigma_q / np.sqrt(t.periods) * rng.normal(size=len(t.q)), omega, t.harmonics)
+        c = kept.project(t.sigma_q / np.sqrt(t.periods) * rng.normal(size=len(t.q)))
         dc = derivative(c, omega)
         ddc = derivative(dc, omega)
-        off = {s: getattr(t, s) + evaluate(x, t.t, omega) for s, x in (("q", c), ("dq", dc), ("ddq", ddc))}
+        off = {s: getattr(t, s) + kept.evaluate(x) for s, x in (("q", c), ("dq", dc), ("ddq", ddc))}
         error = model.regressor(averaged_motion(replace(t, **off))).Phi[:, 0] - clean
         smooth = np.array([n != "Coulomb friction" for n in (p.name for p in model.parameters)])
         error[:, ~smooth] = 0.0  # a sign jumps, which has no derivative

@@ -11,7 +11,6 @@ from scipy.special import chdtri
 from davinci_forces.maths.contact.weighing import (
     MIN_AGREEMENT,
     PARTS,
-    Constant,
     MassEstimate,
     Rows,
     agreement,
@@ -384,7 +383,7 @@ def test_joints_count_by_how_well_their_models_do_in_free_motion():
 
 
 def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
-    monkeypatch.setattr(weigh, "guess", lambda signals: None)
+    monkeypatch.setattr(weigh, "repetition", lambda signals: None)
     t = T[: len(T) - 300]
     logs = [
         log("fitted", "identification", 103),
@@ -504,7 +503,7 @@ def test_the_error_of_a_mass_pools_the_run_with_free_motion_and_widens_by_what_t
 
 
 def test_a_constant_with_which_the_mass_is_twice_the_known_one_is_twice_too_large():
-    assert scaled_constant(0.08, 0.2, MassEstimate(0.4, 0.04)) == pytest.approx(Constant(0.04, 0.004))
+    assert scaled_constant(0.08, 0.2, MassEstimate(0.4, 0.04)) == pytest.approx((0.04, 0.004))
 
 
 @pytest.mark.parametrize(("probability", "widens"), [(0.02, False), (0.009, True)])

@@ -4,8 +4,6 @@ Those that state a model of chance, on a joint that is linear in its state: ther
 good as it says.
 """
 
-from importlib import import_module
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -27,9 +25,7 @@ FIRST_STD = 2.0  # of the external effort, before the first sample
 NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
 SEEDS = 100
 
-FILTER = pytest.mark.parametrize(
-    "track", [import_module(f"davinci_forces.filters.{name}").track for name in FILTERS], ids=FILTERS
-)
+FILTER = pytest.mark.parametrize("track", [tracker(name) for name in FILTERS], ids=FILTERS)
 STEPPED = pytest.mark.parametrize("name", ["ekf", "ekf_euler"])
 STATED = pytest.mark.parametrize("name", ["ekf", "ekf_euler", "rts"])  # of the model of chance that is simulated
 

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import zoomable
 
-from davinci_forces.report.content import Band, Figure, Line, Panel, Points
-from davinci_forces.report.content.document import MAX_POINTS_OF_MARK
+from davinci_forces.report.content import MAX_POINTS_OF_MARK, Band, Figure, Line, Panel, Points
 from davinci_forces.report.content.thinning import envelope, thin_mark
 from davinci_forces.report.writers.numbers import thin_figure, thinning_note
 

@@ -17,10 +17,7 @@ def estimate(problem: Regression) -> Estimate:
     active, the effort errs less than that of least squares, because projections onto a convex set are no further apart
     than their points.  The stated error of a parameter at its bound is too large.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the conic program is not solved, or if least squares raise this error.
+    Raises NotIdentifiable if the conic program is not solved, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     theta = nearest(R, of_signs(problem.known.signs(len(R.y)))).theta

@@ -18,10 +18,7 @@ LAG = 3  # samples before and after: a low-pass does not correlate noise over th
 def estimate(problem: Regression) -> Estimate:
     """theta = (Z' Phi)^-1 Z' tau with instruments Z_k = Phi_(k-3) + Phi_(k+3); each log is a period.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the instruments do not separate the parameters, or if least squares raise this error.
+    Raises NotIdentifiable if the instruments do not separate the parameters, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     root = np.sqrt(weight)[:, None]

@@ -128,11 +128,8 @@ Estimator = Callable[[Regression], Estimate]
 def factorise(problem: Regression, weight: Array) -> Triangle:
     """Compute the QR factors of the weighted rows; weight (K,) is 0 without a sample.  (6.42)
 
-    Raises
-    ------
-    NotIdentifiable
-        If a weight or a sample is not a number, or the effort does not vary.  If there are no more samples than
-        parameters, or the columns of Phi are linearly dependent.
+    Raises NotIdentifiable if a weight or a sample is not a number, the effort is constant, there are no more samples
+    than parameters, or columns of Phi are linearly dependent.
     """
     K, p = int(np.count_nonzero(weight)), problem.Phi.shape[1]
     if p >= K:

@@ -32,10 +32,7 @@ def estimate(problem: Regression) -> Estimate:
     noise in a column is as smooth as the column, as noise of kept harmonics is; white noise in columns would make them
     too large.  Neither includes noise of the columns that is not in the residual.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the noise of the columns is not known or too large, or if least squares raise this error.
+    Raises NotIdentifiable if the noise of the columns is not known or too large, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     if problem.Phi_cov is None:

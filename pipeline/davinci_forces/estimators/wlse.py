@@ -24,10 +24,7 @@ def estimate(problem: Regression) -> Estimate:
     noise, a constant variance of the model's error is added to all samples, so that weights become more equal.  Without
     it, the weights would favour samples of little noise, at which the model errs as much as at all others.
 
-    Raises
-    ------
-    NotIdentifiable
-        If a log has fewer than `MIN_PERIODS` periods.
+    Raises NotIdentifiable if a log has fewer than `MIN_PERIODS` periods.
     """
     fewest = min(median_periods(M) for M in np.split(problem.periods, problem.starts[1:]))
     if fewest < MIN_PERIODS:

@@ -15,7 +15,7 @@ from davinci_forces.filters.response import noise_model
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level
+from davinci_forces.maths.contact.detection import alarm_level
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -227,7 +227,7 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
         bands = [calibrate(free_errors(band, False)) for band in catalogue.select(ErrorBand, joint=joint.name)]
         spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
         unfitted = [space for space in spaces if space.role != "identification"] or spaces
-        levels = [alarm_level([FreeMotionStatistics(s.free_rms, s.free_max, s.crossings)]) for s in unfitted]
+        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in unfitted]
         levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
             "rate": tuned.rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],

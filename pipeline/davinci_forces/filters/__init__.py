@@ -1,11 +1,20 @@
-"""Filters that track the external effort: one module each, exporting `blocks`, `track` and `NAME`."""
+"""Filters that track the external effort: one module each, exporting `blocks` and `NAME`."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, BlockFilter, Filter, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.filters.problem import (
+    Block,
+    BlockFilter,
+    Filter,
+    NoiseModel,
+    Recording,
+    Tracked,
+    join_blocks,
+    whole,
+)
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
@@ -14,9 +23,13 @@ MAX_NIS_RATIO = 50.0  # of the mean normalised innovation squared to 2, the mean
 
 
 def tracker(name: str) -> Filter:
-    """Return the filter of that name."""
-    track: Filter = import_module(f"davinci_forces.filters.{name}").track
-    return track
+    """Return the filter of that name, over a recording in memory."""
+    return whole(_blocks(name))
+
+
+def _blocks(name: str) -> BlockFilter:
+    blocks: BlockFilter = import_module(f"davinci_forces.filters.{name}").blocks
+    return blocks
 
 
 def title(name: str) -> str:
@@ -36,8 +49,7 @@ def filter_parts(
 
 def filter_blocks(name: str, parts: Sequence[Recording], noise: NoiseModel) -> Iterator[Block]:
     """Yield the blocks of a filter's pass over the parts of a recording."""
-    blocks: BlockFilter = import_module(f"davinci_forces.filters.{name}").blocks
-    start = 0
+    blocks, start = _blocks(name), 0
     for part in parts:
         for rows, tracked in blocks(part, noise):
             yield slice(start + rows.start, start + rows.stop), tracked

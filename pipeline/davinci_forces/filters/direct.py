@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, input_blocks, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Measured minus model"
@@ -19,6 +19,3 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
         zeros = np.zeros(len(q))
         yield rows, Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, zeros, zeros, zeros)
-
-
-track = whole(blocks)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording
 
 NAME = "Extended Kalman filter, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
@@ -22,6 +22,3 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)
     return kalman.run_blocks(recording, model)
-
-
-track = whole(blocks)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, column, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, column
 
 NAME = "Extended Kalman filter, forward Euler"
 
@@ -25,6 +25,3 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     model = kalman.states(recording, noise)._replace(order=1, doubts=False)
     model.Q[:2, :2] = np.diag([noise.q_q**2 + step_q_var, noise.q_dq**2 + step_dq_var])
     return kalman.run_blocks(recording, model)
-
-
-track = whole(blocks)

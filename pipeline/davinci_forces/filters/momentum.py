@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, block_rows, column, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, block_rows, column
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import bias
 
@@ -36,9 +36,6 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         z, state = lfilter([0.0, 1.0 - decay], [1.0, -decay], drive + K * p, zi=state)
         std = deviation(M, rows.start, K, decay, T_s, noise, initial_std)
         yield rows, Tracked(q, dq, z - K * p, std, *np.zeros((3, len(q))))
-
-
-track = whole(blocks)
 
 
 def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:

@@ -313,10 +313,7 @@ class Stream:
     and `joints` those with estimates.  `rate` [Hz] is that of the samples, and `delay` [s] that of the estimate.
     `offset` is an effort per joint that is subtracted, 0 unless it is set.
 
-    Raises
-    ------
-    ValueError
-        If a joint has no filter, or joints have different rates.
+    Raises ValueError if a joint has no filter, or joints have different rates.
     """
 
     def __init__(self, model: Mapping[str, Any]) -> None:

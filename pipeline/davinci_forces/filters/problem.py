@@ -1,7 +1,7 @@
 """The input and the output of every filter."""
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -116,6 +116,7 @@ def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked.
     return Tracked(**{name: columns.get(name, np.empty(0)) for name in Tracked._fields})
 
 
+@cache
 def whole(blocks: BlockFilter) -> Filter:
     """Return the filter of a recording in memory, from one that filters it block by block."""
 
@@ -126,20 +127,12 @@ def whole(blocks: BlockFilter) -> Filter:
     return track
 
 
-def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[Recording]:
-    """Return the segments of a joint's log for a filter, as measured; a filter restarts after each gap.
+def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool = False) -> list[Recording]:
+    """Return the segments of a joint's log for a filter, which restarts after each gap.
 
-    `tau_hat` (N,) is the effort of another fit, to be subtracted instead of the model's effort.
+    `tau_hat` (N,) is the effort of another fit, to be subtracted instead of the model's effort.  The motion is that
+    measured, or low-passed if `smooth`.
     """
-    return _segments(model, "_measured", tau_hat)
-
-
-def smooth_filter_inputs(model: JointModel) -> list[Recording]:
-    """Return the segments of a joint's log for a filter, with the motion low-passed."""
-    return _segments(model, "", None)
-
-
-def _segments(model: JointModel, suffix: str, tau_hat: Array | None) -> list[Recording]:
     gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
     coefficients = (model.constant, *gravity, model.spring, *friction)
     T_s, initial_std = 1.0 / model.rate, float(np.std(model.tau)) or 1.0
@@ -148,7 +141,7 @@ def _segments(model: JointModel, suffix: str, tau_hat: Array | None) -> list[Rec
         which = slice(start + rows.start, start + rows.stop)
         part = model.part(which)
         known = part.tau_known if tau_hat is None else part.tau_known + (tau_hat[which] - part.tau_hat)
-        q, dq = getattr(part, f"q{suffix}"), getattr(part, f"dq{suffix}")
+        q, dq = (part.q, part.dq) if smooth else (part.q_measured, part.dq_measured)
         return FilterInput(
             JointDynamics(part.inertia, coefficients, known), q, dq, part.ddq, part.tau, T_s, initial_std
         )

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, whole
+from davinci_forces.filters.problem import Block, NoiseModel, Recording
 
 NAME = "Kalman filter, effort and its rate"
 
@@ -24,6 +24,3 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
     model.Phi[2, 3] = T_s
     model.Q[2:, 2:] = noise.q_tau**2 / T_s**2 * np.array([[T_s**2 / 3.0, T_s / 2.0], [T_s / 2.0, 1.0]])
     return kalman.run_blocks(recording, model)
-
-
-track = whole(blocks)

@@ -56,7 +56,6 @@ def transition(
 
 
 Belief = tuple[float, float, float, float, float, float, float, float, float]
-Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13; f21 f22 f23; 0 0 1], row by row
 
 
 def first(q: float, dq: float, r_q: float, r_dq: float, initial_std: float) -> Belief:

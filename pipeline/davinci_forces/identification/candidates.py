@@ -19,15 +19,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model, Parameter
 from davinci_forces.maths.models.terms import Term, offset, presliding_friction
-from davinci_forces.maths.selection import (
-    CrossValidation,
-    Equations,
-    LeftOut,
-    Ridge,
-    combine_efforts,
-    solve,
-    sum_all,
-)
+from davinci_forces.maths.selection import CrossValidation, Equations, LeftOut, Ridge, combine_efforts, solve, sum_all
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM, Reach, coupled_arm, frictions, independent, round_scale
 from davinci_forces.robots.robot import Joint, Robot
@@ -262,10 +254,7 @@ def weights_of(parts: Sequence[CandidatePart]) -> Array:
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     """Return the range and the speed of a joint's motion, over all logs that move it.
 
-    Raises
-    ------
-    NotIdentifiable
-        If its velocity is 0 throughout, as far as noise lets one tell.
+    Raises NotIdentifiable if its velocity is 0 throughout, as far as noise lets one tell.
     """
     ranges, squares, count = [], 0.0, 0
     for log in logs:

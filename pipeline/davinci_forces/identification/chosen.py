@@ -196,10 +196,7 @@ def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
 
     The standard errors remain those of the candidate, as `consistent` keeps those of least squares.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the conic program is not solved.
+    Raises NotIdentifiable if the conic program is not solved.
     """
     equations, samples = sum_all(part.by_block), part.library.cells.samples
     fit = nearest(factor(equations, part.ridge), part.model.mechanism)

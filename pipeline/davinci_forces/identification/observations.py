@@ -7,12 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
-from davinci_forces.identification.regression import (
-    averaged_motion,
-    joined_motion,
-    motion_at,
-    stands_still,
-)
+from davinci_forces.identification.regression import averaged_motion, joined_motion, motion_at, stands_still
 from davinci_forces.identification.scores import select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces

@@ -10,7 +10,7 @@ from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
 from davinci_forces.maths.periods.shift import likeness
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.records import Choice, CrossFit, Fit, FittedPaths, Motion
+from davinci_forces.records import Choice, Fit, FittedPaths, Motion
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import ARM, model_of
 from davinci_forces.robots.robot import Robot
@@ -20,16 +20,15 @@ STATIC_FRICTION = ("Coulomb friction", "Stribeck friction")  # parameters that a
 
 
 class Identified:
-    """The fits of a robot's joints, refits without some logs, chosen models and fitted paths.
+    """The fits of a robot's joints, chosen models and fitted paths.
 
     `records` are those of these kinds that a stage has read.
     """
 
-    def __init__(self, robot: Robot, records: Iterable[Fit | CrossFit | Choice | FittedPaths]) -> None:
+    def __init__(self, robot: Robot, records: Iterable[Fit | Choice | FittedPaths]) -> None:
         records = list(records)
         self.robot, self._models = robot, dict[tuple[str, ...], Model]()
         self.fits = [r for r in records if isinstance(r, Fit)]
-        self.cross_fits = [r for r in records if isinstance(r, CrossFit)]
         self._choices = [r for r in records if isinstance(r, Choice)]
         self._paths = {r.joint: r for r in records if isinstance(r, FittedPaths)}
 
@@ -76,10 +75,7 @@ class Identified:
     def fit_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
         """Return the fit of a joint along a log with the joints `held`, and why it replaces the fit of the setting.
 
-        Raises
-        ------
-        PipelineError
-            If there is no fit of that name.
+        Raises PipelineError if there is no fit of that name.
         """
         fit, stand_in = self.fit_of(joint, setting), self.fit_of(joint, FALLBACK)
         if fit is None:

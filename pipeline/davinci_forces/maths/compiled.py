@@ -104,10 +104,7 @@ def temporary() -> Path:
 def private(place: Path, parents: bool = False) -> Path:
     """Create the folder if needed, and check that only this user may write to it.
 
-    Raises
-    ------
-    PermissionError
-        If the folder is a link or belongs to another user, or if others may write to it.
+    Raises PermissionError if the folder is a link or belongs to another user, or if others may write to it.
     """
     place.mkdir(mode=0o700, parents=parents, exist_ok=True)
     status = place.lstat()

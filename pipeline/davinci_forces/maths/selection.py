@@ -97,10 +97,7 @@ class Ridge(NamedTuple):
 def solve(equations: Equations, ridge: Ridge) -> Array:
     """Solve the equations of one cell for the parameters (p,).
 
-    Raises
-    ------
-    LinAlgError
-        If the columns are linearly dependent and there is no ridge.
+    Raises LinAlgError if the columns are linearly dependent and there is no ridge.
     """
     scaled, size = scaled_equations(equations, ridge)
     return np.asarray(np.linalg.solve(scaled, ridge.weights @ equations.right[0] / size) / size)
@@ -124,10 +121,7 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
 def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
     """Covariance (p, p) of the parameters under independent noise of each effort, with a variance (m,).
 
-    Raises
-    ------
-    LinAlgError
-        If rounding makes a variance negative.
+    Raises LinAlgError if rounding makes a variance negative.
     """
     scaled, size = scaled_equations(equations, ridge)
     inverse = np.linalg.inv(scaled) / size / size[:, None]
@@ -226,10 +220,7 @@ class LeftOut:
     def cross_validate(self, ridge: Ridge) -> CrossValidation:
         """Cross-validate a candidate: leave out each group of cells in turn, and predict it.
 
-        Raises
-        ------
-        LinAlgError
-            If the columns of the other cells are linearly dependent.
+        Raises LinAlgError if the columns of the other cells are linearly dependent.
         """
         unseen, fitted, of_all = [], [], solve(self.all, ridge)
         for groups in self.schemes:
@@ -266,10 +257,7 @@ def choose_candidate(
     The chosen one has the lowest rank, such as the number of parameters, that has a candidate not clearly worse than
     the best.  Of that rank it is the one with the least error.
 
-    Raises
-    ------
-    ValueError
-        If no candidate is eligible.
+    Raises ValueError if no candidate is eligible.
     """
     indices = [i for i, good in enumerate(eligible) if good]
     best = min(indices, key=lambda i: candidates[i].score)

@@ -69,10 +69,7 @@ def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) ->
 def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     """Simulate the whole arm from rest at its first reference; the lead time is simulated but not recorded.
 
-    Raises
-    ------
-    BadScenario
-        If the motion diverges, for example because the gains are too high for the tick.
+    Raises BadScenario if the motion diverges, for example because the gains are too high for the tick.
     """
     simulated_arm, robot = cast(SimulatedArm, scenario.arm), scenario.robot
     chain, bodies = _geometry(scenario)

@@ -25,10 +25,7 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
 
     Without `force`, logs and truth.toml are put beside the scenario's study.toml, and no other file changes.
 
-    Raises
-    ------
-    BadRequest
-        If `check` refuses the folder, or it holds another study.toml or a file with the name of a log.
+    Raises BadRequest if `check` refuses the folder, or it holds another study.toml or a file with the name of a log.
     """
     check(folder, force)
     text = study_text(scenario)

@@ -11,7 +11,6 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
     Agreement,
-    Constant,
     MassEstimate,
     Rows,
     agreement,
@@ -30,13 +29,14 @@ from davinci_forces.maths.contact.weighing import (
     widening_factor,
 )
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.periods.period import guess, refine
+from davinci_forces.maths.periods.period import refine
+from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, TorqueConstant, Weight, diagnostic
-from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 
 FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing touches the arm
@@ -128,11 +128,11 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
     """Common period [s] of the joints; 0 if the motion does not repeat."""
     part = max(segments(motions[0].segment), key=lambda part: part.stop - part.start)
     positions = [motion.q_measured[part] for motion in motions]
-    lag = guess(positions)
-    if lag is None:
+    match = repetition(positions)
+    if match is None:
         return 0.0
     orders = max(robot.joint(motion.joint).harmonics for motion in motions)
-    return refine(motions[0].t[part], positions, lag / motions[0].rate, orders)
+    return refine(motions[0].t[part], positions, match.lag / motions[0].rate, orders)
 
 
 def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
@@ -220,28 +220,28 @@ def torque_constants(
         if not load.is_current or not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
             continue
         assert weighing.weight.mass
-        constant = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)
+        scaled = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)
         stated = float("nan") if joint.effort else joint.torque_constant
-        yield TorqueConstant(weighing.log, load.joint, weighing.weight.mass, stated, constant.value, constant.std)
-        yield diagnostic(
-            "weigh", f"{weighing.log}.{load.joint}.torque-constant", "note",
-            proposal(f"{weighing.log}/{load.joint}", weighing.weight.mass, constant, stated, joint),
-        )  # fmt: skip
+        record = TorqueConstant(weighing.log, load.joint, weighing.weight.mass, stated, *scaled)
+        yield record
+        subject = f"{weighing.log}.{load.joint}.torque-constant"
+        yield diagnostic("weigh", subject, "note", proposal(record, joint.gear_ratio))
 
 
-def proposal(name: str, mass: float, constant: Constant, stated: float, joint: Joint) -> str:
+def proposal(record: TorqueConstant, gear_ratio: float) -> str:
     """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
+    value, std, used = record.torque_constant, record.torque_constant_std, record.torque_constant_used
     text = (
-        f"{name}: the known mass of {mass:g} kg gives torque_constant = {constant.value:.3g} ± {constant.std:.2g} "
-        f"N m/A with gear_ratio = {joint.gear_ratio:g}"
+        f"{record.log}/{record.joint}: the known mass of {record.stated_mass:g} kg gives torque_constant = "
+        f"{value:.3g} ± {std:.2g} N m/A with gear_ratio = {gear_ratio:g}"
     )
-    if constant.value < 0:
+    if value < 0:
         return f"{text}; it is negative, so check the sign of the current and the position of the mass"
-    if np.isnan(stated):
+    if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
-    away = abs(constant.value - stated) / constant.std
+    away = abs(value - used) / std
     verdict = "which agrees" if away <= NORMAL_95 else "which differs: check mass, position, gear and motor"
-    return f"{text}; {stated:g} is used, {away:.1f} standard errors away, {verdict}; the proposal is not applied"
+    return f"{text}; {used:g} is used, {away:.1f} standard errors away, {verdict}; the proposal is not applied"
 
 
 class FreeMotionErrors(NamedTuple):

@@ -24,7 +24,7 @@ minus the modelled effort, because a smoother spreads a part of a push out of it
 errors if free motion holds few windows.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -66,10 +66,9 @@ def free_motion_statistics(tau_ext: Array, free: Booleans, rate: float) -> FreeM
     return FreeMotionStatistics(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
 
 
-def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
-    """The effort level that each free motion crosses at most once in ten minutes."""
-    alarms = (max(s.crossings / FALSE_ALARMS, 1.0) for s in statistics)
-    return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(statistics, alarms, strict=True))
+def alarm_level(rms: float, largest: float, crossings: float) -> float:
+    """The effort level that free motion with these `FreeMotionStatistics` crosses at most once in ten minutes."""
+    return max(largest, rms * float(np.sqrt(2.0 * np.log(max(crossings / FALSE_ALARMS, 1.0)))))
 
 
 def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
@@ -78,7 +77,7 @@ def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
     It tells nothing of the few samples at which something may have touched the arm.
     """
     rms = SIGMA * float(np.median(np.abs(tau_ext[free])))
-    return alarm_level([free_motion_statistics(tau_ext, free, rate)._replace(rms=rms, largest=0.0)])
+    return alarm_level(rms, 0.0, free_motion_statistics(tau_ext, free, rate).crossings)
 
 
 def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:

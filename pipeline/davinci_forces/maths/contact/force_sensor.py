@@ -28,17 +28,17 @@ MIN_CORRELATION = 0.5  # signals with a smaller correlation do not show one forc
 class ForceErrors(NamedTuple):
     """Errors of an estimated force, or of one component, in its unit and relative to the range."""
 
-    rmse: float
-    rmse_std: float
-    bias: float  # of a vector, the size of its mean error
-    bias_std: float
-    largest: float
-    largest_std: float
-    span: float  # range of the sensor's force, the mean over components
-    relative: float
-    relative_std: float
-    coverage: float  # share of samples whose 95 % band contains the sensor's force
-    coverage_std: float
+    force_error: float
+    force_error_std: float
+    force_bias: float  # of a vector, the size of its mean error
+    force_bias_std: float
+    force_error_max: float
+    force_error_max_std: float
+    force_range: float  # range of the sensor's force, the mean over components
+    force_relative_error: float
+    force_relative_error_std: float
+    sensor_coverage: float  # share of samples whose 95 % band contains the sensor's force
+    sensor_coverage_std: float
 
 
 def interpolate_sensor(t: Array, clock: Array, f: Array, reach: float) -> Array:

@@ -59,13 +59,6 @@ class MassEstimate(NamedTuple):
     std: float
 
 
-class Constant(NamedTuple):
-    """A torque constant and its standard error [N m/A]."""
-
-    value: float
-    std: float
-
-
 class Agreement(NamedTuple):
     """Whether the masses that joints tell alone agree: the probability of their chi-square if they do."""
 
@@ -107,13 +100,13 @@ def pooled_std(run: MassEstimate, free: Sequence[MassEstimate]) -> float:
     return birge * std * students_95((PARTS - 1) * (1 + len(free))) / NORMAL_95
 
 
-def scaled_constant(constant: float, known_mass: float, apparent: MassEstimate) -> Constant:
-    """The torque constant with which a known mass [kg] has the effort that it showed.
+def scaled_constant(constant: float, known_mass: float, apparent: MassEstimate) -> tuple[float, float]:
+    """The torque constant with which a known mass [kg] has the effort that it showed, and its standard error [N m/A].
 
     K = K_0 m / m_0,    s_K = |K| s_0 / |m_0|,    m_0 the mass that appears with the constant K_0
     """
     value = constant * known_mass / apparent.mass
-    return Constant(value, abs(value * apparent.std / apparent.mass))
+    return value, abs(value * apparent.std / apparent.mass)
 
 
 def agreement(masses: Sequence[MassEstimate]) -> Agreement:
@@ -184,10 +177,7 @@ def widening_factor(free: Sequence[MassEstimate], common: float) -> float:
 def moved_with(chain: Chain, coordinate: int) -> str:
     """The link between base and tip that a coordinate moves; in a parallelogram, the one about the remote centre.
 
-    Raises
-    ------
-    ValueError
-        If the coordinate moves nothing between base and tip.
+    Raises ValueError if the coordinate moves nothing between base and tip.
     """
     for body in to_base(chain, int(chain.body[chain.names.index(chain.tip)])):
         if chain.coordinate[body - 1] == coordinate:

@@ -69,10 +69,7 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
 
     For a mechanism without bodies, the parameters of least squares are returned if their signs are possible.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the solver does not converge.
+    Raises NotIdentifiable if the solver does not converge.
     """
     if not mechanism.links and (R.theta[mechanism.positive] >= 0).all():
         return ConsistentParameters(R.theta, R.theta, 0.0)
@@ -133,10 +130,7 @@ def scales_of_entries(size: Array, least: float) -> Array:
 def solve(F: csc_array, y: Array, cones: Cones) -> Array:
     """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the solver converges at no price.
+    Raises NotIdentifiable if the solver converges at no price.
     """
     for price in PRICES:
         z, gap, status = solve_at_price(F, y, cones, price)
@@ -180,10 +174,7 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
 
     z are the entries of every J in kg and `LENGTH`; `price` (n - 10 L,) makes x comparable with them.
 
-    Raises
-    ------
-    NotIdentifiable
-        If the solver does not converge.
+    Raises NotIdentifiable if the solver does not converge.
     """
     import clarabel
 

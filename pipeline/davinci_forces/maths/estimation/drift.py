@@ -56,10 +56,7 @@ def outlier_probabilities(x: Array, std: Array) -> Array:
         others, others_std = np.delete(x, i), np.delete(std, i)
         if len(others) < MIN_VALUES_TREND:
             continue
-        w = others_std**-2
-        mean = float(np.average(others, weights=w))
-        birge = max(float(np.sum(w * (others - mean) ** 2)) / (len(others) - 1), 1.0)
-        spread = float(np.sqrt(birge * (std[i] ** 2 + 1.0 / w.sum())))
+        mean, spread = _mean_and_spread(others, others_std, std[i])
         p[i] = two_sided((x[i] - mean) / spread, len(others) - 1)
     return p
 
@@ -70,10 +67,19 @@ def control_limits(x: Array, std: Array, inside: float) -> tuple[float, Array]:
     The distance, at each error, is Student's quantile with n - 1 degrees of freedom times the standard deviation of the
     difference; errors are widened as the values scatter.  Shewhart's chart has equal errors, and n without end.
     """
+    mean, spread = _mean_and_spread(x, std, std)
+    return mean, stdtrit(len(x) - 1, 0.5 + 0.5 * inside) * spread
+
+
+def _mean_and_spread(x: Array, std: Array, further: Array) -> tuple[float, Array]:
+    """Weighted mean of values (n,), and standard deviation of the difference from it of values with errors `further`.
+
+    Errors are widened if the values scatter by more than theirs.
+    """
     w = std**-2
     mean = float(np.average(x, weights=w))
     birge = max(float(np.sum(w * (x - mean) ** 2)) / (len(x) - 1), 1.0)
-    return mean, stdtrit(len(x) - 1, 0.5 + 0.5 * inside) * np.sqrt(birge * (std**2 + 1.0 / w.sum()))
+    return mean, np.sqrt(birge * (further**2 + 1.0 / w.sum()))
 
 
 def two_sided(z: float, freedom: int) -> float:

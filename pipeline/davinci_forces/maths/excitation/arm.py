@@ -141,10 +141,7 @@ def design_together(
 ) -> ArmDesign:
     """Design the trajectories of the best of several starts of the search; `report_start` reports each start.
 
-    Raises
-    ------
-    ValueError
-        If a joint's limits cannot be kept, or if the regressor of every trajectory is rank deficient.
+    Raises ValueError if a joint's limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
     if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
         raise ValueError(reason)

@@ -68,10 +68,7 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
 def design(problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None) -> Design:
     """Design the trajectory of the best of several starts of the search; `report_start` reports each.  (6.27)
 
-    Raises
-    ------
-    ValueError
-        If the limits cannot be kept, or if the regressor of every trajectory is rank deficient.
+    Raises ValueError if the limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
     if reason := impossible(problem.limits):
         raise ValueError(reason)

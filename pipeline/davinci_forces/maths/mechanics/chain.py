@@ -60,10 +60,7 @@ class Chain:
     def with_coordinates(self, n: int) -> "Chain":
         """The same arm with only its first n coordinates; all later ones are fixed at 0.
 
-        Raises
-        ------
-        ValueError
-            If the chain has fewer than n coordinates.
+        Raises ValueError if the chain has fewer than n coordinates.
         """
         if n == self.n:
             return self

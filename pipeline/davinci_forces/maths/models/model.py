@@ -82,42 +82,33 @@ class Model(Protocol):
     @property
     def name(self) -> str:
         """Its structure and friction, as in keys and in the setting `fit`, such as "independent"."""
-        ...
 
     @property
     def group(self) -> str:
         """The name of the joint that it models, or "arm"."""
-        ...
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Its joints, in the order of the axis n."""
-        ...
 
     @property
     def efforts(self) -> tuple[str, ...]:
         """The joints whose effort it predicts, in the order of the axis m: all its joints, or some."""
-        ...
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters, in the order of theta."""
-        ...
 
     @property
     def displacements(self) -> Collection[tuple[int, float]]:
         """The index of the joint and the displacement, for every deflection in the model."""
-        ...
 
     @property
     def mechanism(self) -> Mechanism:
         """The dependence of its parameters on physical numbers, and their constraints."""
-        ...
 
     def regressor(self, motion: ArmMotion) -> Regressor:
         """Phi with tau = Phi theta.  (6.38)"""
-        ...
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
         """The dynamics of each joint in `efforts`, for a filter.  (7.15), (7.16)"""
-        ...

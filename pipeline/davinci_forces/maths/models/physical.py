@@ -87,10 +87,7 @@ def reduced_parameters(
     inertia, gravity sine and cosine.  A prismatic joint has a lifted mass and the inertia of its rotor.  With drives,
     there is also viscous and Coulomb friction.
 
-    Raises
-    ------
-    ValueError
-        If the inertia or gravity of the chain does not follow these terms.
+    Raises ValueError if the inertia or gravity of the chain does not follow these terms.
     """
     q = np.zeros((len(POSES), n))
     q[:, joint] = POSES

@@ -123,16 +123,6 @@ class Harmonics:
             yield part, basis(self._rest[start - self._even : part.stop - self._even], self.omega, harmonics)
 
 
-def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
-    """Fit the coefficients to samples (N,) by least squares."""
-    return Harmonics(t, omega, harmonics).project(x)
-
-
-def evaluate(c: Array, t: Array, omega: float) -> Array:
-    """The signal (N,) that the coefficients describe."""
-    return Harmonics(t, omega, len(c) // 2).evaluate(c)
-
-
 def _pairs(parts: Array) -> NDArray[np.complex128]:
     """The cosine and sine parts (..., 2 H + 1) of each harmonic as one number (..., H), in the same memory."""
     return parts[..., 1:].view(np.complex128)

@@ -7,7 +7,6 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.periods.harmonics import Harmonics, derivative
-from davinci_forces.maths.periods.repetition import repetition
 
 LINES_LOST = 2.0  # spectral lines by which an interval of two standard errors is widened; found by simulation
 LINES_BESIDE = 1000  # spectral lines used above the highest harmonic; 3e-4 of the slope's power is beyond them
@@ -18,12 +17,6 @@ class Period(NamedTuple):
 
     length: float
     std: float
-
-
-def guess(signals: Sequence[Array]) -> float | None:
-    """Shortest lag after which all signals repeat, in samples, or None if they do not repeat."""
-    match = repetition(signals)
-    return None if match is None else match.lag
 
 
 def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, steps: int = 30) -> float:

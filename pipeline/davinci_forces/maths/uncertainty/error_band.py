@@ -157,12 +157,12 @@ def error_of_coverage(inside: Array, n: float) -> float:
 class FreeSpaceLevels(NamedTuple):
     """Levels of |tau_ext| in free space, with standard errors by block bootstrap."""
 
-    rms: float
-    rms_std: float
-    level_95: float
-    level_95_std: float
-    level_99: float
-    level_99_std: float
+    free_rms: float
+    free_rms_std: float
+    free_level: float
+    free_level_std: float
+    detection_level: float
+    detection_level_std: float
     coverage: float  # share of samples within 1.96 stated standard deviations
     coverage_std: float
 
@@ -172,12 +172,12 @@ def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
     samples = evenly(len(tau_ext), MAX_SAMPLES_BOOTSTRAP)
     size, inside = np.abs(tau_ext[samples]), (np.abs(tau_ext[samples]) <= NORMAL_95 * std[samples]).astype(float)
     return FreeSpaceLevels(
-        rms=float(np.sqrt(np.mean(size**2))),
-        rms_std=error_of_pooled_mean(size**2, function=np.sqrt),
-        level_95=float(np.quantile(size, TYPICAL_SHARE)),
-        level_95_std=error_of_quantile(size, TYPICAL_SHARE),
-        level_99=float(np.quantile(size, DETECTED_SHARE)),
-        level_99_std=error_of_quantile(size, DETECTED_SHARE),
+        free_rms=float(np.sqrt(np.mean(size**2))),
+        free_rms_std=error_of_pooled_mean(size**2, function=np.sqrt),
+        free_level=float(np.quantile(size, TYPICAL_SHARE)),
+        free_level_std=error_of_quantile(size, TYPICAL_SHARE),
+        detection_level=float(np.quantile(size, DETECTED_SHARE)),
+        detection_level_std=error_of_quantile(size, DETECTED_SHARE),
         coverage=float(np.mean(inside)),
         coverage_std=error_of_coverage(inside, count_uncorrelated(tau_ext[samples] / std[samples])),
     )

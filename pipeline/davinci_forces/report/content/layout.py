@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from davinci_forces.report.content.document import (
+from davinci_forces.report.content import (
     Block,
     Bullets,
     Cell,
@@ -57,10 +57,7 @@ def number_blocks(document: Document) -> tuple[Placed, ...]:
     """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3, and S1, S2, S3
     where they are on screen only.
 
-    Raises
-    ------
-    ValueError
-        If references lead nowhere, with all of their labels.
+    Raises ValueError if references lead nowhere, with all of their labels.
     """
     named = {name_of(block) for block in walk(document)}
     if missing := sorted(set(marked_texts(document, "reference")) - named):

@@ -6,23 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content.marks import (
-    AnyMark,
-    Band,
-    Bars,
-    HBand,
-    Histogram,
-    HLine,
-    Line,
-    Line3D,
-    Points,
-    Points3D,
-    Reference,
-    Stems,
-    Tiles,
-    VLine,
-    VSpan,
-)
+from davinci_forces.report.content import marks
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.figures.palette import AXES, COLOURS, WORDS
 from davinci_forces.report.figures.shapes import SMALL_SIZE, path, symbols, trace, words
@@ -30,7 +14,7 @@ from davinci_forces.report.figures.ticks import Axis
 
 LINE_WIDTH, THIN_WIDTH = 0.9, 0.5  # [pt] widths of lines
 DASH_LENGTHS = {"dashed": "3.6,1.5", "dotted": "0.9,1.3", "dashdot": "4.5,1.3,0.9,1.3"}
-OPACITIES = {Band: 0.25, HBand: 0.22, VSpan: 0.18, Histogram: 0.75}
+OPACITIES = {marks.Band: 0.25, marks.HBand: 0.22, marks.VSpan: 0.18, marks.Histogram: 0.75}
 SYMBOL_SIZE, BAR_END = 2.6, 2.0  # [pt] diameter of a point, half-width of the ends of an error bar
 MANY = 60  # more stems than this are thin and have no heads, so that marks behind them stay visible
 BARS_WIDTH, BAR_SHARE = 0.8, 0.92  # of the distance of two names: all bars of a name; of its place: one bar
@@ -83,42 +67,42 @@ def fill(colour: str, opacity: float) -> str:
     return f"fill: {colour}; fill-opacity: {opacity:g}; stroke: none"
 
 
-def draw_mark(mark: AnyMark, frame: Frame) -> tuple[str, str]:
+def draw_mark(mark: marks.AnyMark, frame: Frame) -> tuple[str, str]:
     """A mark behind the lines and in front of them, as SVG."""
     colour = COLOURS[mark.colour]
     match mark:
-        case Line():
+        case marks.Line():
             return "", path(frame.outline(mark.x, mark.y), stroke(colour, style=mark.style))
-        case Points():
+        case marks.Points():
             return "", draw_points(mark, frame)
-        case Band():
+        case marks.Band():
             x, y = np.r_[mark.x, mark.x[::-1]], np.r_[mark.upper, mark.lower[::-1]]
-            return path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[Band])), ""
-        case Stems():
+            return path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[marks.Band])), ""
+        case marks.Stems():
             return "", draw_stems(mark, frame)
-        case Histogram():
+        case marks.Histogram():
             x, y = np.repeat(mark.edges, 2), np.r_[0.0, np.repeat(mark.counts, 2), 0.0]
-            return "", path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[Histogram]))
-        case HLine():
+            return "", path(frame.outline(x, y, closed=True), fill(colour, OPACITIES[marks.Histogram]))
+        case marks.HLine():
             return "", path(frame.outline([frame.x.low, frame.x.high], [mark.y] * 2), stroke(colour, style=mark.style))
-        case VLine():
+        case marks.VLine():
             return "", path(frame.outline([mark.x] * 2, [frame.y.low, frame.y.high]), stroke(colour, style=mark.style))
-        case HBand():
+        case marks.HBand():
             ends = [frame.x.low, frame.x.high]
             edges = "".join(frame.outline(ends, [level] * 2) for level in (mark.lower, mark.upper))
-            area = path(frame.box(-np.inf, np.inf, mark.lower, mark.upper), fill(colour, OPACITIES[HBand]))
+            area = path(frame.box(-np.inf, np.inf, mark.lower, mark.upper), fill(colour, OPACITIES[marks.HBand]))
             return area, path(edges, stroke(colour, THIN_WIDTH))  # in front of marks, which would hide a narrow band
-        case VSpan():
-            return path(frame.box(mark.start, mark.end, -np.inf, np.inf), fill(colour, OPACITIES[VSpan])), ""
-        case Reference():
+        case marks.VSpan():
+            return path(frame.box(mark.start, mark.end, -np.inf, np.inf), fill(colour, OPACITIES[marks.VSpan])), ""
+        case marks.Reference():
             x = np.array([frame.x.low, frame.x.high])
             return "", path(frame.outline(x, mark.intercept + mark.slope * x), stroke(colour, style=mark.style))
-        case Tiles():
+        case marks.Tiles():
             return "", draw_tiles(mark, frame)
     raise TypeError(f"{type(mark).__name__} cannot be drawn")
 
 
-def draw_points(mark: Points, frame: Frame) -> str:
+def draw_points(mark: marks.Points, frame: Frame) -> str:
     """Symbols with error bars and names."""
     colour, x, y, svg = COLOURS[mark.colour], frame.place_x(mark.x), frame.place_y(mark.y), ""
     if mark.y_std is not None:
@@ -141,7 +125,7 @@ def error_bars(x: Array, low: Array, high: Array, colour: str) -> str:
     return path(trace(xs, ys), stroke(colour))
 
 
-def draw_stems(mark: Stems, frame: Frame) -> str:
+def draw_stems(mark: marks.Stems, frame: Frame) -> str:
     """Stems from zero, with heads unless there are many."""
     colour, many = COLOURS[mark.colour], len(mark.x) > MANY
     x, zero = frame.place_x(mark.x), frame.place_y(np.zeros(len(mark.x)))
@@ -152,7 +136,7 @@ def draw_stems(mark: Stems, frame: Frame) -> str:
     return base + path(trace(xs, ys), stroke(colour, THIN_WIDTH if many else LINE_WIDTH)) + heads
 
 
-def draw_bars(bars: Sequence[Bars], frame: Frame) -> str:
+def draw_bars(bars: Sequence[marks.Bars], frame: Frame) -> str:
     """The Bars of a panel side by side over their shared names."""
     svg, width = "", BARS_WIDTH / max(len(bars), 1)
     for i, mark in enumerate(bars):
@@ -163,7 +147,7 @@ def draw_bars(bars: Sequence[Bars], frame: Frame) -> str:
     return svg
 
 
-def draw_tiles(mark: Tiles, frame: Frame) -> str:
+def draw_tiles(mark: marks.Tiles, frame: Frame) -> str:
     """Tinted tiles with their numbers."""
     svg = ""
     for k, value in enumerate(mark.value.tolist()):
@@ -176,12 +160,12 @@ def draw_tiles(mark: Tiles, frame: Frame) -> str:
     return svg
 
 
-def draw_sample(mark: AnyMark | Line3D | Points3D, x: float, y: float, width: float) -> str:
+def draw_sample(mark: marks.AnyMark | marks.Line3D | marks.Points3D, x: float, y: float, width: float) -> str:
     """The sample of a mark before its legend entry, in the middle of a line [pt]."""
     colour, ends = COLOURS[mark.colour], np.array([x, x + width])
-    if isinstance(mark, Points | Points3D):
+    if isinstance(mark, marks.Points | marks.Points3D):
         return path(symbols(np.array([x + width / 2]), np.array([y])), dots(colour))
-    if isinstance(mark, Band | HBand | VSpan | Histogram | Bars):
+    if isinstance(mark, marks.Band | marks.HBand | marks.VSpan | marks.Histogram | marks.Bars):
         box = trace(ends[[0, 1, 1, 0]], y + np.array([-3.0, -3.0, 3.0, 3.0]), closed=True)
         return path(box, fill(colour, OPACITIES.get(type(mark), 1.0)))
     return path(trace(ends, np.array([y, y])), stroke(colour, style=getattr(mark, "style", "solid")))

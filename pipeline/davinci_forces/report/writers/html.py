@@ -35,12 +35,7 @@ TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 def render(document: Document) -> bytes:
     """The whole file; the same document gives the same bytes.
 
-    Raises
-    ------
-    ValueError
-        If a reference leads nowhere.
-    NotTypeset
-        If an equation is wrong.
+    Raises ValueError if a reference leads nowhere.  Raises NotTypeset if an equation is wrong.
     """
     placed = number_blocks(document)
     figures = {item.anchor: item.block for item in flatten(placed) if isinstance(item.block, Figure | Figure3D)}

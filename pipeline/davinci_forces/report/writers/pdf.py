@@ -5,19 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.report.content import (
-    Bullets,
-    Document,
-    Equation,
-    Figure,
-    Figure3D,
-    Listing,
-    OnScreen,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-)
+from davinci_forces.report import content
 from davinci_forces.report.content.inline import parse, printable
 from davinci_forces.report.content.layout import NO_BREAK, Placed, columns, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
@@ -27,18 +15,13 @@ TEMPLATE = Path(__file__).parent / "templates/report.typ"
 Json = dict[str, Any]
 
 
-def render(document: Document) -> bytes:
+def render(document: content.Document) -> bytes:
     """The whole file; the same document gives the same bytes.
 
-    Raises
-    ------
-    ValueError
-        If a reference leads nowhere.
-    NotTypeset
-        If Typst fails or warns.
+    Raises ValueError if a reference leads nowhere.  Raises NotTypeset if Typst fails or warns.
     """
     placed = number_blocks(document)
-    content = {
+    data = {
         "title": printable(document.title),
         "study": printable(document.study),
         "simulated": document.simulated,
@@ -49,7 +32,7 @@ def render(document: Document) -> bytes:
         "onscreen": sorted(on_screen(placed)),
         "blocks": [_placed(item) for item in placed],
     }
-    return typeset(TEMPLATE, content, "pdf")[0]
+    return typeset(TEMPLATE, data, "pdf")[0]
 
 
 def _placed(item: Placed) -> Json:
@@ -63,7 +46,7 @@ def _inline(text: str) -> list[Json]:
     return [span._asdict() for span in parse(text)]
 
 
-def _table(table: Table) -> Json:
+def _table(table: content.Table) -> Json:
     rows = table.rows if table.printed is None else tuple(table.rows[i] for i in table.printed)
     more = f" {len(table.rows) - len(rows)} more in the HTML report." * (len(rows) < len(table.rows))
     shown = columns(replace(table, rows=rows))
@@ -80,20 +63,22 @@ def _table(table: Table) -> Json:
     }
 
 
-def _figure(figure: Figure | Figure3D) -> Json:
+def _figure(figure: content.Figure | content.Figure3D) -> Json:
     return {"caption": _inline(figure.caption), "alt": printable(figure.alt), "svg": svg(figure)}
 
 
 # Data that the template needs of a block in addition to kind, number, anchor and depth.
 DATA: dict[type, Callable[[Any], Json]] = {
-    Section: lambda section: {"title": _inline(section.title)},
-    OnScreen: lambda folded: {"title": _inline(folded.title)},
-    Prose: lambda prose: {"paragraphs": [_inline(part.strip()) for part in prose.text.split("\n\n") if part.strip()]},
-    Bullets: lambda bullets: {"items": [_inline(item) for item in bullets.items]},
-    Listing: lambda listing: {"text": printable(listing.text)},
-    Verdict: lambda verdict: {"level": verdict.level, "text": _inline(verdict.text)},
-    Equation: lambda equation: {"typst": equation.typst, "alt": equation.alt},
-    Table: _table,
-    Figure: _figure,
-    Figure3D: _figure,
+    content.Section: lambda section: {"title": _inline(section.title)},
+    content.OnScreen: lambda folded: {"title": _inline(folded.title)},
+    content.Prose: lambda prose: {
+        "paragraphs": [_inline(part.strip()) for part in prose.text.split("\n\n") if part.strip()]
+    },
+    content.Bullets: lambda bullets: {"items": [_inline(item) for item in bullets.items]},
+    content.Listing: lambda listing: {"text": printable(listing.text)},
+    content.Verdict: lambda verdict: {"level": verdict.level, "text": _inline(verdict.text)},
+    content.Equation: lambda equation: {"typst": equation.typst, "alt": equation.alt},
+    content.Table: _table,
+    content.Figure: _figure,
+    content.Figure3D: _figure,
 }

@@ -18,10 +18,7 @@ class NotTypeset(PipelineError):
 def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list[bytes]:
     """Compile a template that reads `content` as data, never as markup; one item per page of SVG, one for a PDF.
 
-    Raises
-    ------
-    NotTypeset
-        If Typst fails or warns, with its own message.
+    Raises NotTypeset if Typst fails or warns, with its own message.
     """
     import matplotlib as mpl
     import typst

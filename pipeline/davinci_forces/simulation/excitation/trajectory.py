@@ -119,10 +119,7 @@ def coefficient_names(harmonics: int) -> list[str]:
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
     """Plot position, velocity and acceleration over one period, with their limits.  Fig 6.5
 
-    Raises
-    ------
-    BadRequest
-        If the file's name does not end in one of PLOTS.
+    Raises BadRequest if the file's name does not end in one of PLOTS.
     """
     if path.suffix not in PLOTS:
         raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
@@ -160,10 +157,7 @@ def table(
     The period starts at t = 0, and the run-in has negative times; if `from_rest` is False, there is no run-in.  The
     run-in keeps the `limits` of the arm.
 
-    Raises
-    ------
-    BadRequest
-        If the periods differ, a period is no whole number of samples, or no run-in keeps the limits.
+    Raises BadRequest if the periods differ, a period is no whole number of samples, or no run-in keeps the limits.
     """
     samples = _samples(excitations, rate)
     before = _run_in_samples(excitations, samples, rate, limits) if from_rest else 0

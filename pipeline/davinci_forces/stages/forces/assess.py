@@ -5,12 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.contact.detection import (
-    FreeMotionStatistics,
-    alarm_level,
-    free_motion_statistics,
-    typical_alarm_level,
-)
+from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.windows import free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, diagnostic
@@ -58,20 +53,13 @@ def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
-    yield FreeSpace(
+    yield FreeSpace.like(
+        space,
         log=track.log,
         joint=track.joint,
         filter=name,
         role=track.role,
         tested=int(np.sum(free)),
-        free_rms=space.rms,
-        free_rms_std=space.rms_std,
-        free_level=space.level_95,
-        free_level_std=space.level_95_std,
-        detection_level=space.level_99,
-        detection_level_std=space.level_99_std,
-        coverage=space.coverage,
-        coverage_std=space.coverage_std,
         band_width=NORMAL_95 * float(std[free].mean()),
         free_max=statistics.largest,
         crossings=statistics.crossings,
@@ -89,8 +77,8 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     for joint, joint_spaces in by_joint.items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
-        statistics = ([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)] for space in unfitted)
-        level, source = max(zip(map(alarm_level, statistics), unfitted, strict=True), key=lambda pair: pair[0])
+        alarms = [alarm_level(space.free_rms, space.free_max, space.crossings) for space in unfitted]
+        level, source = max(zip(alarms, unfitted, strict=True), key=lambda pair: pair[0])
         yield Threshold(
             joint, SMOOTHER, worst.detection_level, worst.detection_level_std, level,
             level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log, len(unfitted),

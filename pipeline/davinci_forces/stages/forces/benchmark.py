@@ -6,14 +6,7 @@ from functools import partial
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, FILTERS, filter_parts
-from davinci_forces.filters.problem import (
-    FilterInput,
-    LongInput,
-    NoiseModel,
-    Recording,
-    filter_inputs,
-    smooth_filter_inputs,
-)
+from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel, Recording, filter_inputs
 from davinci_forces.filters.response import DURATION, half_sine, noise_model, response
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import FALLBACK, Identified
@@ -61,7 +54,7 @@ def compare(
     label: str, name: str, model: JointModel, noise: NoiseModel, free: Booleans, push: float
 ) -> Iterator[Comparison | Diagnostic]:
     """Filter a joint of a log without and with a push; measure the level in free space and the response."""
-    parts = smooth_filter_inputs(model) if name == "direct" else filter_inputs(model)
+    parts = filter_inputs(model, smooth=name == "direct")
     _, _, tau_ext, std, *_ = filter_parts(name, parts, noise, ("tau_ext", "tau_ext_std"))
     if not np.isfinite(tau_ext).all():
         return
@@ -75,11 +68,9 @@ def compare(
         yield diagnostic(
             "benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; state a shorter delay in [settings]"
         )
-    yield Comparison(
-        log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
-        free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,
-        detection_level=space.level_99, detection_level_std=space.level_99_std, push_peak=push, push_share=shown.share,
-        push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
+    yield Comparison.like(
+        space, log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
+        push_peak=push, push_share=shown.share, push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
     )  # fmt: skip
 
 

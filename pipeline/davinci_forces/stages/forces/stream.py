@@ -11,7 +11,7 @@ from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
+from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space
@@ -120,7 +120,7 @@ def gather(streams: Iterable[Streamed]) -> Iterator[StreamLevel]:
     for stream in streams:
         by_joint.setdefault(stream.joint, []).append(stream)
     for joint, logs in by_joint.items():
-        levels = [alarm_level([FreeMotionStatistics(s.free_rms, s.free_max, s.crossings)]) for s in logs]
+        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in logs]
         level, source = max(zip(levels, logs, strict=True), key=lambda pair: pair[0])
         yield StreamLevel(
             joint=joint, alarm_level=level, alarm_level_std=level * source.free_rms_std / source.free_rms,

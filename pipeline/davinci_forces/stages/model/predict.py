@@ -106,10 +106,7 @@ def apply(
 
     A chosen model also gets its residual in an identification log, as the fits of joints by themselves have theirs.
 
-    Raises
-    ------
-    PipelineError
-        If no fit has the name that the settings state.
+    Raises PipelineError if no fit has the name that the settings state.
     """
     if entry.role == "friction":
         return

@@ -79,10 +79,7 @@ def run(
 def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], Repetition | None, list[str]]:
     """The joints that repeat, their common repetition in samples, and a remark on each joint that does not.
 
-    Raises
-    ------
-    NotPeriodic
-        If no joint repeats, and the study states a period.
+    Raises NotPeriodic if no joint repeats, and the study states a period.
     """
     repeat, periodic = common_repetition(moving), moving
     if repeat is None:
@@ -121,10 +118,7 @@ def longest_stretch(
 ) -> tuple[slice, float]:
     """The longest stretch around a repetition in which the period is constant, and the period.
 
-    Raises
-    ------
-    NotPeriodic
-        If the stretch has fewer than two periods.
+    Raises NotPeriodic if the stretch has fewer than two periods.
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
     span, length = slice(0, 0), 0.0

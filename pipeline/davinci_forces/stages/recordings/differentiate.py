@@ -32,7 +32,8 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
 def derivatives(average: Average, harmonics: int) -> Iterator[Column]:
     """Position, velocity and acceleration (K,) from the first harmonics of an averaged position.  (6.34)"""
     omega = 2 * np.pi / average.period
-    c = fourier.project(average.t, average.q, omega, harmonics)
+    kept = fourier.Harmonics(average.t, omega, harmonics)
+    c = kept.project(average.q)
     for _ in range(3):
-        yield fourier.evaluate(c, average.t, omega)
+        yield kept.evaluate(c)
         c = fourier.derivative(c, omega)

@@ -14,11 +14,8 @@ from davinci_forces.study.intake.summary import remarks, summary
 def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch | LogSummary | Diagnostic]:
     """Read recordings and touches in consecutive blocks, then a summary and the remarks of the reader.
 
-    Raises
-    ------
-    BadLog
-        If a channel is missing, holds something that is not a number, or has a unit that is unknown or contradicts
-        the study; if time does not increase; or if the clocks of channels do not go together.
+    Raises BadLog if a channel is missing, holds something that is not a number, or has a unit that is unknown or
+    contradicts the study. It also does if time does not increase or the clocks of channels do not go together.
     """
     intake = Intake(log, entry, robot)
     for block in without_clock_jumps(intake, intake.clocks.blocks()):

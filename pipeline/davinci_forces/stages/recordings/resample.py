@@ -51,11 +51,8 @@ MAX_LISTED_STRETCHES = 3  # in a remark
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
     """Make one Signal and one Motion of a recording.  A gap starts a new segment and is not interpolated across.
 
-    Raises
-    ------
-    BadLog
-        If no segment between gaps holds more than a few samples, velocity and position contradict each other, or the
-        motion lies far beyond the joint's limits.
+    Raises BadLog if no segment between gaps holds more than a few samples, velocity and position contradict each other,
+    or the motion lies far beyond the joint's limits.
     """
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
     cuts = (np.flatnonzero(are_gaps(recording.t, T_s)) + 1).tolist()
@@ -102,12 +99,6 @@ def moves(q: Column, joint: Joint) -> bool:
     return reach > MIN_MOTION * (high - low if np.isfinite(high - low) else 1.0)
 
 
-def slow_velocity(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
-    """Velocity (N,) of a low-passed position (N,), segment by segment."""
-    slow = lowpass_segments(q, segment, rate, cutoff)
-    return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
-
-
 def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
     """The Motion of a joint, also of one at rest, which other joints may drive; the low-pass removes its noise."""
     q, dq, ddq = smooth
@@ -133,15 +124,14 @@ def velocity_faults(
 ) -> Iterator[str]:
     """State where a logged velocity differs from the derivative of the logged position, both low-passed.
 
-    Raises
-    ------
-    BadLog
-        If one is several times the other.
+    Raises BadLog if one is several times the other.
     """
     if recording.velocity == "derived" or not (moves(q, joint) or moves(np.cumsum(dq - dq.mean()) / rate, joint)):
         return
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
-    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), slow_velocity(q, segment, rate, cutoff))
+    slow = lowpass_segments(q, segment, rate, cutoff)
+    derived = np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
+    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), derived)
     if abs(ratio - 1) < MAX_VELOCITY_ERROR:
         return
     hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
@@ -170,10 +160,7 @@ def median_ratio(x: Column, reference: Column) -> float:
 def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[str]:
     """State where low-passed positions and velocities lie beyond the joint's limits.
 
-    Raises
-    ------
-    BadLog
-        If they lie so far beyond that no motion of this joint is like that.
+    Raises BadLog if they lie so far beyond that no motion of this joint is like that.
     """
     beyond, largest = [], 0.0
     names = ("positions", "{position}"), ("velocities", "{position}/s")

@@ -75,29 +75,11 @@ def apply(
     if robot.chain is None or len(robot.joints) < TIP_JOINTS or entry.role in ("weight", "friction"):
         return
     by_joint = {track.joint: track for track in tracks}
-    if len(robot.joints) > TIP_JOINTS:  # the chain would assume that the joints beyond stand still
+    if why := why_unknown(by_joint, robot, robot.chain):
         if entry.role in ("contact", "tissue"):
-            why = f"{robot.name} has {len(robot.joints)} joints"
-            follows = (
-                f"the efforts of more than {TIP_JOINTS} also hold a moment; use the external efforts of the joints"
-            )
-            message = f"{entry.name}: no force at the tip: {why}, and {follows}"
-            yield diagnostic("resolve", entry.name, "note", message)
+            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {why}")
         return
-    names = [joint.name for joint in robot.joints]
-    missing = list(missing_joints(names, by_joint))
-    if missing:
-        if entry.role in ("contact", "tissue"):
-            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
-        return
-    tracks = [by_joint[name] for name in names]
-    chain, q = robot.chain, np.column_stack([track.q for track in tracks])
-    if bool(evaluate_in_blocks(lambda block: is_singular(chain, block), q).all()):
-        if entry.role in ("contact", "tissue"):
-            why = "no pose determines all its directions, as where the last frame lies on a joint's axis"
-            message = f"{entry.name}: no force at the tip: {why}; add a fixed link to the tip of the tool"
-            yield diagnostic("resolve", entry.name, "note", message)
-        return
+    tracks = [by_joint[joint.name] for joint in robot.joints]
     free = free_of(tracks, entry) & entry.has_known_free_motion
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
@@ -110,6 +92,21 @@ def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
     """Whether all joints move in free space at each sample (N,), for the smoother."""
     free = [free_smoothed(track.t, entry.possible_contact, track.rate, track.unscored) for track in tracks]
     return np.asarray(np.all(free, axis=0))
+
+
+def why_unknown(tracks: dict[str, Track], robot: Robot, chain: Chain) -> str:
+    """State why the force at the tip is not known in a log; "" if it is."""
+    if len(robot.joints) > TIP_JOINTS:  # the chain would assume that the joints beyond stand still
+        follows = f"the efforts of more than {TIP_JOINTS} also hold a moment; use the external efforts of the joints"
+        return f"{robot.name} has {len(robot.joints)} joints, and {follows}"
+    names = [joint.name for joint in robot.joints]
+    if missing := "; ".join(missing_joints(names, tracks)):
+        return missing
+    q = np.column_stack([tracks[name].q for name in names])
+    if bool(evaluate_in_blocks(lambda block: is_singular(chain, block), q).all()):
+        why = "no pose determines all its directions, as where the last frame lies on a joint's axis"
+        return f"{why}; add a fixed link to the tip of the tool"
+    return ""
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
@@ -145,10 +142,11 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
         space = levels(np.linalg.norm(f[tested], axis=1), reach / NORMAL_95)
     return TipForce(
         log=first.log, role=first.role, filter=first.filter, model=first.model, tested=int(tested.sum()),
-        force_rms=space.rms, force_rms_std=space.rms_std, force_level=space.level_95,
-        force_level_std=space.level_95_std, force_detection=space.level_99, force_detection_std=space.level_99_std,
-        force_coverage=space.coverage, force_coverage_std=space.coverage_std, rho_12=float(rho[0]),
-        rho_13=float(rho[1]), rho_23=float(rho[2]), correlation_from=source,
+        force_rms=space.free_rms, force_rms_std=space.free_rms_std, force_level=space.free_level,
+        force_level_std=space.free_level_std, force_detection=space.detection_level,
+        force_detection_std=space.detection_level_std, force_coverage=space.coverage,
+        force_coverage_std=space.coverage_std, rho_12=float(rho[0]), rho_13=float(rho[1]), rho_23=float(rho[2]),
+        correlation_from=source,
         median_condition=float(np.median(blur)), near_share=float(near.mean()), t=first.t, x=x, y=y, z=z,
         f_x=f[:, 0], f_y=f[:, 1], f_z=f[:, 2], c_xx=C[:, 0, 0], c_yy=C[:, 1, 1], c_zz=C[:, 2, 2], c_xy=C[:, 0, 1],
         c_xz=C[:, 0, 2], c_yz=C[:, 1, 2], condition=np.minimum(blur, np.finfo(float).max),

@@ -123,13 +123,9 @@ def sensor_force(
     error = errors(estimate.f[tested], estimate.C[tested], measured[tested])
     late = lag(estimate.t, estimate.f, clock, sensor, rate, tested)
     drawn = size(estimate) if estimate.f.shape[1] > 1 else estimate
-    yield SensorForce(
-        log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), force_error=error.rmse,
-        force_error_std=error.rmse_std, force_bias=error.bias, force_bias_std=error.bias_std,
-        force_error_max=error.largest, force_error_max_std=error.largest_std, force_range=error.span,
-        force_relative_error=error.relative,
-        force_relative_error_std=error.relative_std, sensor_lag=late.value, sensor_lag_std=late.std,
-        sensor_coverage=error.coverage, sensor_coverage_std=error.coverage_std, t=estimate.t,
+    yield SensorForce.like(
+        error, log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), sensor_lag=late.value,
+        sensor_lag_std=late.std, t=estimate.t,
         measured_force=measured[:, 0] if measured.shape[1] == 1 else np.linalg.norm(measured, axis=1),
         estimated_force=drawn.f[:, 0], estimated_force_std=np.sqrt(drawn.C[:, 0, 0]),
     )  # fmt: skip

@@ -13,7 +13,6 @@ from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueMo
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
 
-MIN_R2 = 0.9  # of the straight line through a push that is used for the stiffness
 QUARTILE_FACTOR = 1.857  # of the variance of a mean: p (1 - p) over the square of the normal density, p = 1/4
 MIN_SAMPLES_PUSH = 8  # in a log, and in a push with which tissue models are compared
 FILTER = "ekf"
@@ -180,7 +179,7 @@ def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str
     lines = [push.line for push in pushes if push.line is not None]
     k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
     model = np.array([push.k_std_model for push in pushes])
-    counts = r2 > MIN_R2
+    counts = r2 > palpation.MIN_R2
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
     std = median_std(k[counts], k_std[counts], common) if counts.any() else float("nan")
