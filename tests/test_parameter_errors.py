@@ -8,7 +8,11 @@ import pytest
 from scipy.special import stdtrit
 
 from davinci_forces.identification import model_error
-from davinci_forces.maths.selection import Ridge, sum_equations
+from davinci_forces.identification.candidates import Candidate, CandidatePart, CellEquations, Library
+from davinci_forces.maths.models import terms
+from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.selection import PATH_BLOCKS, Ridge, solve, sum_all, sum_equations
 from davinci_forces.records import Average, Fit, Motion, Recording, Signal, Trajectory
 from davinci_forces.simulation.motion import simulate_log, theta
 from davinci_forces.simulation.scenario.reading import load
@@ -117,3 +121,60 @@ def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in
     monkeypatch.setattr(model_error, "solve", lambda cells, ridge: np.array([2.5]))
     changes = model_error.squared_changes(here, np.array([2.0, 7.0, 3.0]), np.full(3, 0.1), there)
     np.testing.assert_allclose(changes, [0.25 - explained, np.nan, 9.0])
+
+
+# The parameters of a joint whose friction builds up over a displacement that is none of those of its models.
+JOINT = {"inertia": 0.4, "viscous friction": 0.5, "Coulomb friction": 0.8}
+TERMS = (terms.inertia, terms.viscous, terms.coulomb, terms.presliding_friction(0.08))
+
+
+def friction_candidates(strength: float) -> list[Candidate]:
+    """A plain model and one with presliding friction, with equations of one simulated log and a ridge."""
+    K, T_s, rng = 3000, 0.01, np.random.default_rng(4)
+    t, k = np.arange(K) * T_s, np.arange(1, 6)
+    angle, a = 2 * np.pi * k * t[:, None] / 30.0 + rng.uniform(0, 6, 5), rng.uniform(0.1, 0.4, 5)
+    w = 2 * np.pi * k / 30.0
+    q, dq, ddq = ((a * f).sum(axis=1)[:, None] for f in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
+    motion = ArmMotion(q, dq, ddq, T_s, np.zeros(K, int), True)
+    true = IndependentJoint("one", (*TERMS[:3], terms.presliding_friction(0.01)), ("",) * 4)
+    tau = true.regressor(motion).Phi @ [*JOINT.values(), 0.8] + rng.normal(0.0, 1e-3, (K, 1))
+    model = IndependentJoint("one", TERMS, ("",) * 4)
+    equations = sum_equations(model.regressor(motion).Phi, tau, np.arange(K) * PATH_BLOCKS // K, PATH_BLOCKS)
+    library = Library(model, (), CellEquations(np.array([K]), equations, equations, equations))
+    made = []
+    for added, columns in (("", [0, 1, 2]), ("dahl", [0, 1, 2, 3])):
+        own = IndependentJoint("one", tuple(TERMS[i] for i in columns), ("",) * len(columns))
+        part = CandidatePart(own, library, columns, Ridge(strength, np.ones(1), np.empty((0, 0))))
+        made.append(Candidate(added or "plain", added, added, (part,)))
+    return made
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.1])
+def test_friction_that_predicts_better_and_a_ridge_widen_the_error_of_the_parameters_that_they_move(strength):
+    candidates = friction_candidates(strength)
+    part = candidates[1].parts[0]
+    theta, noise = solve(sum_all(part.by_block), part.ridge), np.full(4, 1e-4)
+    error = np.abs(theta[:3] - list(JOINT.values()))
+    std = model_error.model_std(part, theta, noise, candidates, 1)[:3]
+    assert (error > 20 * noise[:3]).all()
+    assert (error < 2.0 * std).all()
+    assert (std < 10.0 * error).all()
+
+
+def test_a_parameter_is_compared_with_the_best_plain_model_and_with_models_that_predict_as_well_but_not_itself(
+    monkeypatch,
+):
+    monkeypatch.setattr(model_error, "identities", lambda part: part.names)
+    monkeypatch.setattr(model_error, "standard_error", lambda errors, best: 0.1)
+    rows = (  # name, ridge, added friction, score
+        ("plain", 0.0, "", 1.5), ("plain, offset", 0.0, "", 1.4), ("plain, more ridge", 0.2, "", 1.3),
+        ("itself", 0.1, "dahl", 1.0), ("as well", 0.0, "smooth", 1.19), ("worse", 0.0, "stribeck", 1.21),
+    )  # fmt: skip
+    parts = {
+        name: SimpleNamespace(names=[name], ridge=Ridge(strength, np.ones(1), np.empty((0, 0))))
+        for name, strength, *_ in rows
+    }
+    models = [(parts[name], not added, SimpleNamespace(score=score)) for name, _, added, score in rows]
+    compared = model_error.models_to_compare(parts["itself"], models)
+    assert [name for part in compared for name in part.names] == ["plain, offset", "as well"]
+    assert model_error.models_to_compare(parts["itself"], []) == []

@@ -1,19 +1,21 @@
 """The error of parameters that is due to the model: their change over blocks of path, and over other models.
 
 A model that errs alike in every period has parameters that hardly differ between periods, but are wrong.  They change
-if other parts of the path are fitted, or if the model gets a term that it lacks.  The other models have each friction
+if other parts of the path are fitted, or if the friction is modelled otherwise.  The other models have each friction
 that may be added, and an offset, which with Coulomb friction is friction by direction.  Those count that predict parts
-of the path left out as well as the best: they are not clearly worse, by at most one standard error of the difference.
-No motion separates an offset from the weight of a vertical slide.  There it takes half of the constant effort.
+of the path left out as well as the best: they are not worse by `MIN_Z` standard errors of the difference.  So does the
+best one without added friction, since added friction may take effort from viscous and Coulomb friction and yet predict
+better.  No motion separates an offset from the weight of a vertical slide.  There it takes half of the constant effort.
 
-    s_model^2 = (s_blocks^2 - s_noise^2 + mean over models of ((theta_i - theta)^2 - s_i^2)) / 2,    at least 0
+    s_model^2 = (s_blocks^2 - s_noise^2 + mean over models of ((theta_i - theta)^2 - s_i^2)) / 2 + s_ridge^2
 
-Blocks and models are two estimates of one square, so their mean is taken.  s_i is the part of the difference that noise
-explains: the variance of an efficient estimate is that of another one less that of their difference (Hausman, 1978).
-For white noise s_i^2 = s_noise^2 (C_i / C - 1), C the inverse of Phi' Phi.
+Blocks and models are two estimates of one square, so their mean is taken; it is at least 0.  s_i is the part of the
+difference that noise explains: the variance of an efficient estimate is that of another one less that of their
+difference (Hausman, 1978).  For white noise s_i^2 = s_noise^2 (C_i / C - 1), C the inverse of Phi' Phi.  A ridge moves
+parameters towards 0, and s_ridge^2 is the square of their change without it, less what noise explains.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -22,7 +24,6 @@ from davinci_forces.identification.candidates import Candidate, CandidatePart, i
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.maths.selection import (
-    CLEARLY,
     MAX_GROUPS,
     PATH_BLOCKS,
     CrossValidation,
@@ -38,18 +39,46 @@ from davinci_forces.maths.selection import (
 from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
+MIN_Z = 2.0  # a model predicts worse by more than this many standard errors of the difference
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
 
 def model_std(part: CandidatePart, theta: Array, noise_std: Array, candidates: Iterable[Candidate], logs: int) -> Array:
     """Estimate the standard error due to the model (p,) of parameters (p,) that have an error of noise (p,)."""
-    models = list(other_models(part, candidates, logs))
-    best = min((errors for _, errors in models), key=lambda errors: errors.score, default=None)
-    near = [m for m, errors in models if best and errors.score - best.score <= CLEARLY * standard_error(errors, best)]
-    changes = np.array([squared_changes(part, theta, noise_std, model) for model in near]).reshape(-1, len(theta))
+    compared = models_to_compare(part, list(other_models(part, candidates, logs)))
+    changes = np.array([squared_changes(part, theta, noise_std, model) for model in compared]).reshape(-1, len(theta))
     shared = np.maximum((~np.isnan(changes)).sum(axis=0), 1)
     over_blocks = std_over_blocks(part, logs) ** 2 - noise_std**2
-    return np.asarray(np.sqrt(np.maximum((over_blocks + np.nansum(changes, axis=0) / shared) / 2.0, 0.0)))
+    by_model = (over_blocks + np.nansum(changes, axis=0) / shared) / 2.0
+    by_ridge = np.maximum(squared_changes(part, theta, noise_std, without_ridge(part)), 0.0)
+    return np.asarray(np.sqrt(np.maximum(by_model, 0.0) + by_ridge))
+
+
+def models_to_compare(
+    part: CandidatePart, models: Sequence[tuple[CandidatePart, bool, CrossValidation]]
+) -> list[CandidatePart]:
+    """Return the models of other parameters that predict unseen parts of the path as well as the best, and a plain one.
+
+    The best model without added friction gives friction parameters their usual meaning, however it predicts.
+    """
+    if not models:
+        return []
+    weakest = max(part.ridge.strength, WEAK_RIDGE)
+    plain = [
+        (errors.score, i) for i, (m, is_plain, errors) in enumerate(models) if is_plain and m.ridge.strength <= weakest
+    ]
+    best = min((errors for *_, errors in models), key=lambda errors: errors.score)
+    return [
+        model
+        for i, (model, _, errors) in enumerate(models)
+        if identities(model) != identities(part)
+        if (plain and i == min(plain)[1]) or errors.score - best.score <= MIN_Z * standard_error(errors, best)
+    ]
+
+
+def without_ridge(part: CandidatePart) -> CandidatePart:
+    """Return a part of which a ridge only divides effort between columns that no data separate."""
+    return part._replace(ridge=part.ridge._replace(strength=min(part.ridge.strength, WEAK_RIDGE)))
 
 
 def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: CandidatePart) -> Array:
@@ -94,14 +123,17 @@ def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:
 
 def other_models(
     part: CandidatePart, candidates: Iterable[Candidate], logs: int
-) -> Iterator[tuple[CandidatePart, CrossValidation]]:
-    """Cross-validate the candidates' models of the same joints, each also with an offset; some cannot be refitted."""
-    parts = [p for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
-    same = [p for p in parts if p.model.efforts == part.model.efforts]
+) -> Iterator[tuple[CandidatePart, bool, CrossValidation]]:
+    """Cross-validate the candidates' models of the same joints, each also with an offset; some cannot be refitted.
+
+    The flag tells a model without added friction.
+    """
+    parts = [(p, not c.added) for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
+    same = [(p, is_plain) for p, is_plain in parts if p.model.efforts == part.model.efforts]
     schemes = schemes_of(part.library.cells.scored.squares, logs)
-    for model in (more for p in same for more in with_offset(p)):
+    for model, is_plain in ((more, is_plain) for p, is_plain in same for more in with_offset(p)):
         with suppress(np.linalg.LinAlgError):
-            yield model, LeftOut(model.by_block, schemes, model.score_cells).cross_validate(model.ridge)
+            yield model, is_plain, LeftOut(model.by_block, schemes, model.score_cells).cross_validate(model.ridge)
 
 
 def with_offset(part: CandidatePart) -> Iterator[CandidatePart]:

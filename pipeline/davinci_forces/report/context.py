@@ -62,15 +62,25 @@ class Context:
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter used; a chosen fit is named `chosen.<fit>`."""
         chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
-        if self.study.settings.fit == CHOSEN and chosen:
+        setting = self.study.settings.fit
+        if setting == CHOSEN and chosen:
             return chosen[0]
-        return self.own_fit(joint)
+        return setting if self.fit_named(setting, joint) else self.own_fit(joint)
 
     def used_record(self, joint: str) -> Fit | None:
-        """The chosen fit that the filter used; None if it used the fit of a joint by itself."""
-        setting, _, name = self.used_fit(joint).partition(".")
-        fits = [f for f in self.catalogue.records(Fit) if f"{f.model}.{f.estimator}" == name and setting == CHOSEN]
+        """The fit that the filter used; None if it used the fit of a joint by itself and none was chosen."""
+        fit = self.used_fit(joint)
+        return None if fit == self.own_fit(joint) else self.fit_named(fit.removeprefix(f"{CHOSEN}."), joint)
+
+    def fit_named(self, name: str, joint: str) -> Fit | None:
+        """The fit `<model>.<estimator>` that describes the effort of a joint."""
+        fits = [f for f in self.catalogue.records(Fit) if f"{f.model}.{f.estimator}" == name]
         return next((f for f in fits if joint in self.efforts_of(f)), None)
+
+    def used_predictions(self, joint: str) -> list[Prediction]:
+        """The predictions of a joint's effort by the fit that the filter used."""
+        predictions, used = self.catalogue.select(Prediction, joint=joint), self.used_fit(joint)
+        return [p for p in predictions if f"{p.model}.{p.estimator}" == used]
 
     def efforts_of(self, fit: Fit) -> list[str]:
         """The joints whose efforts a fit describes, in their order."""

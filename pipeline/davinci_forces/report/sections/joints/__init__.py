@@ -44,8 +44,9 @@ def section(context: Context) -> Iterator[Block]:
     yield Prose(
         "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
         "two parts. The part from noise follows from the differences between periods. The part from the model is the "
-        "change of the value if blocks of path are left out, or if the friction is modelled otherwise. $z$ is the "
-        "value over its standard error, both parts together. If $abs(z) < 2$, the parameter may be zero."
+        "change of the value if blocks of path are left out, if the friction is modelled otherwise, and without the "
+        "ridge, which pulls values towards zero. $z$ is the value over its standard error, both parts together. If "
+        "$abs(z) < 2$, the parameter may be zero."
     )
     joints = list(dict.fromkeys(fit.group for fit in fits))
     for joint in joints:
@@ -114,7 +115,7 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     by = "least squares (LSE)" if plain.estimator == "lse" else title_of(plain.estimator)
     differences = "; ".join(changed) or "it has the same terms"
     text = f"Compared with the plain model (this joint alone, by {by}): {differences}."
-    predictions = context.catalogue.select(Prediction, joint=joint, model=CHOSEN)
+    predictions = context.used_predictions(joint)
     if all(p.role == "identification" for p in predictions):
         return text
     worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
