@@ -187,7 +187,7 @@ def predictions(signal, role, fitted, trajectories=(), **changes):
     refits = [r for r in made if isinstance(r, CrossFit)]
     every = [
         *fit.apply(motions, own, refits, about, arm.ARM, lowpass=17.0),
-        *predict.run(motions, identified, about, arm.ARM, lowpass=17.0),
+        *predict.run(motions, identified, about, arm.ARM, lowpass=17.0, fit="chosen"),
     ]
     every = [r for r in every if not isinstance(r, PathShare)]
     return [r for r in every if not isinstance(r, Prediction) or r.model != "chosen"]

@@ -11,7 +11,7 @@ from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std, share_passed
-from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Signal
+from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Residual, Signal
 from davinci_forces.stages.model import choose, fit, predict
 from davinci_forces.stages.recordings import resample
 from davinci_forces.study.entries import ROLES
@@ -99,6 +99,19 @@ def test_the_model_of_a_joint_is_its_fit_along_the_low_passed_motion(identified)
     b, _, _ = bias(filter_inputs(model)[0].joint.coefficients, model.q, model.dq, 0.0)
     assert_allclose(model.inertia * model.ddq + b + model.tau_known, model.tau_hat)
     assert_array_equal(model.q_measured, signal.q)
+
+
+def test_the_fit_that_the_study_names_is_scored_and_has_its_residual_although_it_was_not_chosen(identified):
+    signal, fits, _ = identified
+    named = replace(next(f for f in fits if f.estimator == "huber"), model="other")
+    fresh, about = arm.motion(replace(signal, log="fresh", role="validation")), entry(name="fresh", role="validation")
+    made = [*predict.run([fresh], [*fits, named], about, arm.ARM, lowpass=CUTOFF, fit="other.huber")]
+    scores = {(p.model, p.estimator): p.relative_error for p in made if isinstance(p, Prediction)}
+    assert scores["other", "huber"] == scores["independent", "huber"]
+    without = [*predict.run([fresh], [*fits, named], about, arm.ARM, lowpass=CUTOFF, fit="independent.huber")]
+    assert all(p.model != "other" for p in without if isinstance(p, Prediction))
+    along = predict.apply([arm.motion(signal)], [], [], [*fits, named], entry(), arm.ARM, fit="other.huber")
+    assert [(r.model, r.estimator) for r in along if isinstance(r, Residual)] == [("other", "huber")]
 
 
 def test_an_identification_log_is_predicted_by_refits_that_had_not_seen_the_sample(identified):

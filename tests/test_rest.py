@@ -67,7 +67,7 @@ def identified():
     means = average.run([signal], entry("identification"), arm.ARM, harmonics=0, lowpass=LOWPASS)
     [mean] = [r for r in means if isinstance(r, Average)]
     [own] = [r for r in differentiate.run(mean, JOINT, harmonics=0) if isinstance(r, Trajectory)]
-    records = list(fit.run([own], [arm.motion(signal)], arm.ARM, lowpass=LOWPASS))
+    records = list(fit.run([own], [arm.motion(signal)], arm.ARM, lowpass=LOWPASS, fit="chosen"))
     fits, [between] = ([r for r in records if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
     [model] = arm.models([signal], fits)
     [noise] = tune.gather(tune.run(model, between, lowpass=LOWPASS, delay=0.1), delay=0.1)
@@ -128,7 +128,9 @@ def test_friction_held_at_rest_moves_no_score_no_level_and_no_band(identified):
     scores, spaces = [], []
     for stuck in (0.9, -0.9):
         signal = resting(stuck, role="validation")
-        made = list(predict.run([arm.motion(signal)], fits, entry("validation"), arm.ARM, lowpass=LOWPASS))
+        made = list(
+            predict.run([arm.motion(signal)], fits, entry("validation"), arm.ARM, lowpass=LOWPASS, fit="chosen")
+        )
         scores.append([r.relative_error for r in made if isinstance(r, Prediction)])
         space, _ = assess.run(tracked(signal, identified), entry("validation"), arm.ARM)
         spaces.append([space.free_rms, space.coverage, space.detection_level, space.free_max])
@@ -163,7 +165,7 @@ def test_a_velocity_within_its_noise_has_no_sign_and_a_presliding_friction_keeps
 def judged(signal, fits, **stated):
     """The relative errors of a log, and what is said of steps in it."""
     about = replace(entry(signal.role), **stated)
-    made = list(predict.run([arm.motion(signal)], fits, about, arm.ARM, lowpass=LOWPASS))
+    made = list(predict.run([arm.motion(signal)], fits, about, arm.ARM, lowpass=LOWPASS, fit="chosen"))
     errors = {r.estimator: r.relative_error for r in made if isinstance(r, Prediction)}
     return errors, [text for r in made if isinstance(r, Diagnostic) for text in r.text]
 

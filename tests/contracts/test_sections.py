@@ -241,6 +241,19 @@ def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_
     assert (verdict.level, "physically impossible" in verdict.text) == ("warn", True)
 
 
+def test_the_report_is_about_the_fit_that_the_study_names_as_the_filter_uses_it(full: Context):
+    joint = full.own_fits()[0].group
+    for name in ("chosen.ridge", "independent.wlse"):
+        settings = replace(full.study.settings, fit=name)
+        context = replace(full, study=replace(full.study, settings=settings))
+        assert context.used_fit(joint) == name
+        assert context.predicting_fits(joint)[0] == name
+        used = context.used_record(joint)
+        assert (used is None) == (name == "independent.wlse")
+        if used:
+            assert (used.model, used.estimator) == ("chosen", "ridge")
+
+
 def test_the_guide_explains_each_column_of_the_table_on_page_one(full: Context):
     table = summary.trust_table(full, [replace(trust, sought=0.5) for trust in trusts(full, hand_roll=0.05)])
     for head in table.header:

@@ -70,7 +70,9 @@ class Context:
     def used_record(self, joint: str) -> Fit | None:
         """The fit that the filter used; None if it used the fit of a joint by itself and none was chosen."""
         fit = self.used_fit(joint)
-        return None if fit == self.own_fit(joint) else self.fit_named(fit.removeprefix(f"{CHOSEN}."), joint)
+        if fit == self.own_fit(joint):
+            return None
+        return self.fit_named(fit.removeprefix(f"{CHOSEN}.") if self.study.settings.fit == CHOSEN else fit, joint)
 
     def fit_named(self, name: str, joint: str) -> Fit | None:
         """The fit `<model>.<estimator>` that describes the effort of a joint."""

@@ -227,7 +227,8 @@ def unseen_score(context: Context, joint: str) -> str:
         level = f", level {context.number(f'{trusted.space.prefix}.detection_level', 2)}"
     model = context.used_fit(joint)
     if (used := context.used_record(joint)) is not None:
-        friction = ", ".join(str(name) for name in used.parameter if "friction" in name)
+        names = [str(name).removesuffix(f" of {joint}") for name in used.parameter]
+        friction = ", ".join(name for name in names if "friction" in name and " of " not in name)
         model = f"{used.structure}, {len(used.theta)} parameters with {friction}, by {used.estimator}"
     share = percent(trusted.share)
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log

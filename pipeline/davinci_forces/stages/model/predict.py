@@ -42,6 +42,7 @@ def run(
     robot: Robot,
     *,
     lowpass: float,
+    fit: str,
 ) -> Iterator[Prediction | PathShare | Diagnostic]:
     """Predict the effort of each moving joint by each fit, in a log that no parameter was fitted to.
 
@@ -57,13 +58,13 @@ def run(
             new, moving = along.identified.path_new(motion), float(np.mean(motion.standing == 0))
             yield PathShare(motion.log, motion.joint, motion.role, new, moving)
             if entry.role != "identification":
-                yield from predict_joint(motion, along, entry, lowpass)
+                yield from predict_joint(motion, along, entry, lowpass, fit)
 
 
 def predict_joint(
-    motion: Motion, along: LogModels, entry: LogEntry, lowpass: float
+    motion: Motion, along: LogModels, entry: LogEntry, lowpass: float, setting: str
 ) -> Iterator[Prediction | Diagnostic]:
-    """Predict the effort of a joint by its own fits and by the chosen one."""
+    """Predict the effort of a joint by its own fits, by the chosen one, and by the one that the setting `fit` names."""
     name = f"{motion.log}/{motion.joint}"
     identified = along.identified
     independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
@@ -76,6 +77,13 @@ def predict_joint(
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
+    named = identified.fit_of(motion.joint, setting) if setting != CHOSEN else None
+    if (
+        named
+        and named not in independent
+        and set(identified.model(named).joints) <= along.joints_on_clock(motion.joint)
+    ):
+        labelled.append((named.model, named.estimator, named))
     scored = is_scored(motion, along, chosen, entry)
     free = scored & is_outside(motion.t, entry.possible_contact)
     if not free.any():
@@ -104,7 +112,8 @@ def apply(
 ) -> Iterator[JointModel | Residual | Diagnostic]:
     """Evaluate the model of each joint along a log; a diagnostic says why a joint has none.
 
-    A chosen model also gets its residual in an identification log, as the fits of joints by themselves have theirs.
+    A model of more than the joint also gets its residual in an identification log, as the fits of joints by themselves
+    have theirs.
 
     Raises PipelineError if no fit has the name that the settings state.
     """
@@ -141,12 +150,17 @@ def apply(
             unscored=unscored, **terms,
         )  # fmt: skip
         yield from model.blocks()
-        if is_fitted and fit == CHOSEN and not motion.at_rest:
-            yield residual_of(model, periods.get(motion.joint))
+        if is_fitted and (fit == CHOSEN or joint_fit.model != "independent") and not motion.at_rest:
+            label = (model.model, model.estimator)
+            label = (CHOSEN, ".".join(label)) if fit == CHOSEN else label
+            yield residual_of(model, periods.get(motion.joint), label)
 
 
-def residual_of(model: JointModel, average: Average | None) -> Residual:
-    """The chosen model's effort and the measured one, averaged over periods, or low-passed like the model's motion."""
+def residual_of(model: JointModel, average: Average | None, label: tuple[str, str]) -> Residual:
+    """A model's effort and the measured one, averaged over periods, or low-passed like the model's motion.
+
+    `label` is the residual's model and estimator.
+    """
     columns = [model.dq, model.tau, model.tau_hat]
     if average is None:
         samples = slice(None, None, max(int(model.rate / (2.0 * model.cutoff)), 1))
@@ -157,8 +171,7 @@ def residual_of(model: JointModel, average: Average | None) -> Residual:
         used = (model.t >= average.t_start - 0.5 / model.rate) & (model.t <= last) & (model.unscored == 0)
         phased = Phases(model.t[used], average.period, len(average))
         t, (dq, tau, tau_hat) = average.t, (phased.fold(x[used]).mean for x in columns)
-    name = f"{model.model}.{model.estimator}"
-    return Residual(model.log, model.joint, CHOSEN, name, model.rate, t=t, dq=dq, tau=tau, tau_hat=tau_hat)
+    return Residual(model.log, model.joint, *label, model.rate, t=t, dq=dq, tau=tau, tau_hat=tau_hat)
 
 
 def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry) -> Booleans:

@@ -6,8 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records import Diagnostic, Fit, Identifiability, Residual
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
@@ -65,7 +64,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     yield parameters(context, joint, used)
     if used is not plain:
         yield Prose(compared_with_plain(context, joint, used, plain))
-    model, by = (used.model, used.estimator) if used is plain else (CHOSEN, f"{used.model}.{used.estimator}")
+    model, _, by = (context.own_fit if used is plain else context.used_fit)(joint).partition(".")
     residuals = context.catalogue.select(Residual, joint=joint, model=model, estimator=by)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
