@@ -252,7 +252,7 @@ def test_a_negative_friction_beside_an_inertia_that_is_not_positive_tells_that_a
     fits = [r for r in made if isinstance(r, Fit)]
     (text,) = [text for diagnostic in arm.models([signal], fits) for text in diagnostic.text]
     assert "the inertia of independent.lse is not positive" in text
-    assert "its friction is negative, too: correct the `sign`" in text
+    assert text.endswith(f"its friction is negative, too: correct the `sign` of its effort or position in {signal.log}")
     assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
     light = [replace(f, theta=np.where(f.parameter == "inertia", -0.1, -f.theta)) for f in fits]
     (other,) = [text for diagnostic in arm.models([signal], light) for text in diagnostic.text]

@@ -262,8 +262,18 @@ def resampled(change: Callable[[Columns], Columns], name="hand_roll", velocity="
         (scaled(dq=DEG), "hand_roll", 57.3, 'is the velocity in deg/s? write unit = "deg/s"'),
         (scaled(q=DEG), "hand_roll", 1 / 57.3, 'is the position in degrees? write unit = "deg"'),
         (scaled(dq=30 / math.pi), "hand_roll", 9.55, 'is the velocity in rpm? write unit = "rpm"'),
-        (scaled(dq=1e3), "instrument_slide", 1e3, 'is the velocity in mm/s? write unit = "mm/s"'),
-        (scaled(q=1e3), "instrument_slide", 1e-3, 'is the position in mm? write unit = "mm"'),
+        (
+            scaled(dq=1e3),
+            "instrument_slide",
+            1e3,
+            'write unit = "mm/s" for its channel, or correct the unit of the position',
+        ),
+        (
+            scaled(q=1e3),
+            "instrument_slide",
+            1e-3,
+            'write unit = "mm" for its channel, or correct the unit of the velocity',
+        ),
         (scaled(t=1e3), "hand_roll", 1e3, 'is the time in ms? write unit = "ms"'),
         (scaled(dq=-1.0), "hand_roll", -1.0, "write sign = -1"),
         (scaled(q=1e-4), "hand_roll", 1e4, "check the sign, unit and column of both"),  # so that it seems at rest

@@ -279,6 +279,10 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
         "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
         "slide, too much to be believed; in free motion all 95 % bands are wide enough."
     )
+    looks = [
+        text for share in (2.04, 1.5) for _, text in summary.looks_at_model(full, trusts(full, hand_roll=share)[0])
+    ]
+    assert ["wrong `sign`" in text for text in looks] == [True, False]
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
     said = opening.verdict_sentence(full, [narrow])

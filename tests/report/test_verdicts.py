@@ -221,6 +221,6 @@ def test_a_numbered_joint_has_no_article_in_a_sentence():
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
     assert verdict_sentence(None, [unjudged]) == "No effort was estimated in free space on the roll."
-    assert "in free motion all 95 % bands are wide enough" in verdict_sentence(
-        None, [replace(unjudged, space=free_space(coverage=0.95))]
-    )
+    for role, where in (("identification", "in free motion all"), ("validation", "that was not fitted, all")):
+        space = replace(free_space(coverage=0.95), role=role)
+        assert f"{where} 95 % bands are wide enough" in verdict_sentence(None, [replace(unjudged, space=space)])

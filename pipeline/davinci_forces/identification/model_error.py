@@ -3,9 +3,10 @@
 A model that errs alike in every period has parameters that hardly differ between periods, but are wrong.  They change
 if other parts of the path are fitted, or if the friction is modelled otherwise.  The other models have each friction
 that may be added, and an offset, which with Coulomb friction is friction by direction.  Those count that predict parts
-of the path left out as well as the best: they are not worse by `MIN_Z` standard errors of the difference.  So does the
-best one without added friction, since added friction may take effort from viscous and Coulomb friction and yet predict
-better.  No motion separates an offset from the weight of a vertical slide.  There it takes half of the constant effort.
+of the path left out as well as the best: they are worse by at most `MAX_WORSE` standard errors of the difference.  So
+does the best one without added friction: added friction may take effort from viscous and Coulomb friction and yet
+predict better.  No motion separates an offset from the weight of a vertical slide.  There it takes half of the constant
+effort.
 
     s_model^2 = (s_blocks^2 - s_noise^2 + mean over models of ((theta_i - theta)^2 - s_i^2)) / 2 + s_ridge^2
 
@@ -39,7 +40,7 @@ from davinci_forces.maths.selection import (
 from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
-MIN_Z = 2.0  # a model predicts worse by more than this many standard errors of the difference
+MAX_WORSE = 2.0  # standard errors of the difference of scores, up to which a model predicts as well as the best
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
 
@@ -72,7 +73,7 @@ def models_to_compare(
         model
         for i, (model, _, errors) in enumerate(models)
         if identities(model) != identities(part)
-        if (plain and i == min(plain)[1]) or errors.score - best.score <= MIN_Z * standard_error(errors, best)
+        if (plain and i == min(plain)[1]) or errors.score - best.score <= MAX_WORSE * standard_error(errors, best)
     ]
 
 

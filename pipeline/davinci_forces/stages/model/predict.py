@@ -209,7 +209,8 @@ def inertia_warning(motion: Motion, fit: Fit, identified: Identified) -> str:
     text = f"{name}: the inertia of {model} is not positive along this log, so its external effort is not estimated"
     friction = identified.is_friction(fit, motion.joint)
     if are_negative(fit.theta[friction], fit.theta_std[friction]):
-        return f"{text}; its friction is negative, too: correct the `sign` of its effort or of its position"
+        fitted = ", ".join(fit.logs)
+        return f"{text}; its friction is negative, too: correct the `sign` of its effort or position in {fitted}"
     return (
         f"{text}; the report may name the cause beside all fits of {motion.joint}: a motion that hardly excites it, a "
         "wrong sign, other joints that move in the same logs, or terms that the model lacks"

@@ -39,9 +39,9 @@ UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the pos
     (180.0 / np.pi, 'is the velocity in deg/s? write unit = "deg/s" for its channel'),
     (np.pi / 180.0, 'is the position in degrees? write unit = "deg" for its channel'),
     (30.0 / np.pi, 'is the velocity in rpm? write unit = "rpm" for its channel'),
-    (1e3, 'is the velocity in mm/s? write unit = "mm/s" for its channel'),
+    (1e3, 'is the velocity in mm/s? write unit = "mm/s" for its channel, or correct the unit of the position'),
     (1e3, 'is the time in ms? write unit = "ms" for its channel'),
-    (1e-3, 'is the position in mm? write unit = "mm" for its channel'),
+    (1e-3, 'is the position in mm? write unit = "mm" for its channel, or correct the unit of the velocity'),
     (-1.0, "is the sign of one opposite? write sign = -1 for its channel"),
 )
 MIN_SAMPLES_SEGMENT = 4  # for a cubic spline

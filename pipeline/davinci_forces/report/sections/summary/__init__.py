@@ -48,6 +48,7 @@ SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motio
 NOT_ESTIMATED = "its external effort is not estimated"  # in a warning that leaves a joint without an answer
 FIRST_OF_ALL = 100.0  # weight of such warnings
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
+NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -297,7 +298,8 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
             left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
             constant = f"; {left} without its constant part, {mean}, as of another payload or an offset of the current"
-        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant}."
+        opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
+        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
 

@@ -42,8 +42,10 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         names = [name_in_sentence(t.joint).removeprefix("the " if i else "") for i, t in enumerate(some)]
         which = as_list(names) if len(names) <= MAX_NAMED else f"{len(names)} of {len(trusts)} joints"
         parts += [f"{why} on {which}"] if names else []
-    if any(trusted.space is not None for trusted in trusts) and not any(trusted.narrow for trusted in trusts):
-        parts += ["in free motion all 95 % bands are wide enough"]
+    roles = {trusted.space.role for trusted in trusts if trusted.space is not None}
+    if roles and not any(trusted.narrow for trusted in trusts):
+        where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
+        parts += [f"{where} all 95 % bands are wide enough"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
