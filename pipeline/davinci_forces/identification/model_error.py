@@ -51,7 +51,9 @@ def model_std(part: CandidatePart, theta: Array, noise_std: Array, candidates: I
     shared = np.maximum((~np.isnan(changes)).sum(axis=0), 1)
     over_blocks = std_over_blocks(part, logs) ** 2 - noise_std**2
     by_model = (over_blocks + np.nansum(changes, axis=0) / shared) / 2.0
-    by_ridge = np.maximum(squared_changes(part, theta, noise_std, without_ridge(part)), 0.0)
+    by_ridge = np.zeros(len(theta))
+    if part.ridge.strength > WEAK_RIDGE:
+        by_ridge = np.maximum(squared_changes(part, theta, noise_std, part.with_ridge(WEAK_RIDGE)), 0.0)
     return np.asarray(np.sqrt(np.maximum(by_model, 0.0) + by_ridge))
 
 
@@ -75,11 +77,6 @@ def models_to_compare(
         if identities(model) != identities(part)
         if (plain and i == min(plain)[1]) or errors.score - best.score <= MAX_WORSE * standard_error(errors, best)
     ]
-
-
-def without_ridge(part: CandidatePart) -> CandidatePart:
-    """Return a part of which a ridge only divides effort between columns that no data separate."""
-    return part._replace(ridge=part.ridge._replace(strength=min(part.ridge.strength, WEAK_RIDGE)))
 
 
 def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: CandidatePart) -> Array:
