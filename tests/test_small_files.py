@@ -11,8 +11,7 @@ import pytest
 
 from davinci_forces.errors import BadStudy
 from davinci_forces.study import reading
-from davinci_forces.toml.file import MOST_PROBLEMS
-from davinci_forces.toml.lines import MAX_TABLES
+from davinci_forces.toml.lines import MAX_TABLES, MOST_PROBLEMS
 from tests.logs.array_writers import SIGNATURE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="what a process took is told by POSIX")

@@ -25,7 +25,6 @@ from davinci_forces.records import (
     ErrorBand,
     Fit,
     JointModel,
-    Record,
     Track,
     store,
 )
@@ -39,8 +38,7 @@ from davinci_forces.runner.runs import folders
 from davinci_forces.study import LogEntry, Settings, Study
 from davinci_forces.study.entries import entries_of
 from davinci_forces.study.reading import settings_of
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 
 IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
 NEW = "new"  # the log that is predicted, or whose external effort is estimated
@@ -213,7 +211,7 @@ class IdentifiedArm:
         texts = new_texts(reading)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
-        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(map(self._effort_label, tracks)), texts)
+        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(self._effort_label(t.joint) for t in tracks), texts)
 
     def plot(self) -> Any:
         """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
@@ -225,7 +223,7 @@ class IdentifiedArm:
                 ax.plot(t, model.tau, "C0", lw=0.7, label="" if i else "measured")
                 ax.plot(t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
                 shift = t[-1]
-            ax.set_ylabel(self._effort_label(self.fits[joint], joint))
+            ax.set_ylabel(self._effort_label(joint))
             ax.set_title(joint, loc="left", fontsize="medium")
         axes[0].legend(loc="upper right")
         axes[-1].set_xlabel("time [s]")
@@ -242,8 +240,8 @@ class IdentifiedArm:
     def _repr_html_(self) -> str:
         return as_html([self.parameters.set_index("group")], self.diagnostics)
 
-    def _effort_label(self, record: Any, joint: str = "") -> str:
-        return f"effort [{self.robot.joint(joint or record.joint).unit('{effort}')}]"
+    def _effort_label(self, joint: str) -> str:
+        return f"effort [{self.robot.joint(joint).unit('{effort}')}]"
 
     def _prediction(self, model: JointModel) -> pd.DataFrame:
         std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
@@ -345,9 +343,8 @@ def axes_of(joints: int) -> Any:
     """One axes a joint (joints,), below each other."""
     from matplotlib import pyplot
 
-    return pyplot.subplots(joints, 1, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")[1][
-        :, 0
-    ]
+    _, axes = pyplot.subplots(joints, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")
+    return axes[:, 0]
 
 
 def new_texts(reading: Any) -> tuple[str, ...]:
@@ -355,9 +352,9 @@ def new_texts(reading: Any) -> tuple[str, ...]:
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
 
 
-def texts_of(diagnostics: Iterable[Record]) -> tuple[str, ...]:
+def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:
     """The texts of diagnostics, without duplicates."""
-    return tuple(dict.fromkeys(str(text) for d in diagnostics if isinstance(d, Diagnostic) for text in d.text))
+    return tuple(dict.fromkeys(str(text) for d in diagnostics for text in d.text))
 
 
 def as_html(tables: Sequence[pd.DataFrame], texts: Sequence[str]) -> str:

@@ -55,8 +55,7 @@ from davinci_forces.maths.mechanics.chain import (
 )
 from davinci_forces.maths.models.terms import TERMS, Term
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, UNLIMITED, Joint, Kind, Limits, Robot
-from davinci_forces.toml import TomlTable, excerpt, is_number
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable, excerpt, is_number
 
 NAME = re.compile(r"[a-z0-9_-]+")
 # Names that Windows reserves for devices, with any suffix; records are files with the names of logs and joints.

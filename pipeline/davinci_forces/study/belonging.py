@@ -24,8 +24,7 @@ from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study.guessing import Holding, Meaning, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 
 ROBOT_FILE = "robot.toml"  # written next to study.toml if no robot fits
 DEFAULT_ROBOT = "davinci"

@@ -11,8 +11,7 @@ from typing import Any
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.files import read_bytes, text_of
-from davinci_forces.toml.file import TomlFile
-from davinci_forces.toml.lines import KeyPath, excess, lines_of
+from davinci_forces.toml.lines import KeyPath, TomlFile, excess, lines_of
 from davinci_forces.toml.ranges import unlikely
 
 MAX_NAME_LENGTH = 100  # characters of an unknown key; a longer key is cut before it is compared with known keys

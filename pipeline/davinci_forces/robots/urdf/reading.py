@@ -22,7 +22,7 @@ from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravit
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
 from davinci_forces.robots.urdf import tables
 from davinci_forces.robots.urdf.tables import MOVING, TIP, Element, Notes, UrdfJoint, inertial_parameters, read_joint
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile
 
 DEFAULT_HARMONICS = 10  # of an unknown excitation: more than most excitations have, and too few to fit noise
 TIPS = (TIP, "tcp", "tool0", "ee_link")  # customary names of the frame at the tip
