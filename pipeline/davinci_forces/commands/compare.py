@@ -12,7 +12,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo, table
 
@@ -23,13 +23,11 @@ LARGEST = 10  # changes of a joint that are listed
 
 
 def run(
-    a: Annotated[Path, typer.Argument(help="A results.json, or a study, raw/<study>, that has one.")],
-    b: Annotated[Path, typer.Argument(help="The results.json or study to compare with it.")],
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="List every change, not the ten largest of each joint.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")
-    ] = False,
+    a: Annotated[Path, Argument(help="A results.json, or a study, raw/<study>, that has one.")],
+    b: Annotated[Path, Argument(help="The results.json or study to compare with it.")],
+    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    every: Annotated[bool, Option("--all", help="List every change, not the ten largest of each joint.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")] = False,
 ) -> None:
     """List what changed from A to B, joint by joint: page one first, models that were not chosen last.
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo, show_markdown
 
@@ -11,13 +11,9 @@ DEFAULT_FILE = Path("davinci-forces-guide.html")
 
 
 def run(
-    topic: Annotated[
-        list[str] | None, typer.Argument(help="Topic or term to show; without one, the list of topics.")
-    ] = None,
-    html: Annotated[
-        bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")
-    ] = False,
-    out: Annotated[Path | None, typer.Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
+    topic: Annotated[list[str] | None, Argument(help="Topic or term to show; without one, the list of topics.")] = None,
+    html: Annotated[bool, Option("--html", help="Write the whole guide as one HTML file, for offline use.")] = False,
+    out: Annotated[Path | None, Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
 ) -> None:
     """Show a topic or the list of topics in the terminal, or write the HTML file and say where it is."""
     from davinci_forces import guide

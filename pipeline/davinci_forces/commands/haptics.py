@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo
 
@@ -18,14 +18,14 @@ Answer = dict[str, object]
 
 def run(
     scenario: Annotated[
-        Path | None, typer.Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
+        Path | None, Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
     csv: Annotated[
-        Path | None, typer.Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
+        Path | None, Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
     ] = None,
     template: Annotated[
-        Path | None, typer.Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")
+        Path | None, Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")
     ] = None,
 ) -> None:
     """Simulate the whole loop: hand, device, link, arm with its controller, friction and filter, and tissue."""

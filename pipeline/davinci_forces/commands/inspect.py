@@ -7,7 +7,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo, table
 
@@ -21,12 +21,12 @@ MAX_REPEATED_OR_JITTER = 0.1  # share of rows, and of the sampling time, above w
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="A log; `davinci-forces guide formats` lists the formats.")],
-    head: Annotated[int, typer.Option(min=0, help="Number of rows to show.")] = 5,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the description as JSON.")] = False,
-    dtype: Annotated[str | None, typer.Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,
+    file: Annotated[Path, Argument(help="A log; `davinci-forces guide formats` lists the formats.")],
+    head: Annotated[int, Option(min=0, help="Number of rows to show.")] = 5,
+    as_json: Annotated[bool, Option("--json", help="Print the description as JSON.")] = False,
+    dtype: Annotated[str | None, Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,
     columns: Annotated[
-        str | None, typer.Option(help="Columns of raw binary numbers: how many, or names, as in t,q,i.")
+        str | None, Option(help="Columns of raw binary numbers: how many, or names, as in t,q,i.")
     ] = None,
 ) -> None:
     """Print the description of a log, as text or JSON."""

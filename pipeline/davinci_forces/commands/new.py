@@ -3,19 +3,19 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo, table
 
 
 def run(
-    files: Annotated[list[Path], typer.Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
+    files: Annotated[list[Path], Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
     robot: Annotated[
         str,
-        typer.Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
+        Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
     ] = "",
-    study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of the first log's.")] = None,
-    show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,
+    study: Annotated[Path | None, Option(help="Folder of the study, instead of the first log's.")] = None,
+    show: Annotated[bool, Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml, and print what to check; an existing file is never overwritten."""
     from davinci_forces.errors import BadRequest

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo
 
@@ -17,20 +17,18 @@ MAX_DEFAULT_COORDINATES = 6  # of the zero pose of an arm with a wrist: the arm 
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
+    robot: Annotated[str, Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
     at: Annotated[
-        str | None, typer.Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
+        str | None, Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
     ] = None,
     dq: Annotated[
-        str | None, typer.Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
+        str | None, Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-    urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    urdf: Annotated[bool, Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
     thesis: Annotated[
         bool,
-        typer.Option(
-            "--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."
-        ),
+        Option("--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."),
     ] = False,
 ) -> None:
     """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.
