@@ -4,7 +4,6 @@ import errno
 import os
 import traceback
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -144,8 +143,7 @@ def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
 _read_cached = lru_cache(maxsize=256)(_read)
 
 
-@contextmanager
-def _writer(folders: Folders, task: Task) -> Iterator["store.Writer"]:
+def _writer(folders: Folders, task: Task) -> "store.Writer":
     from davinci_forces.records import store
 
     def unit(record: Record) -> "store.Unit":
@@ -153,8 +151,7 @@ def _writer(folders: Folders, task: Task) -> Iterator["store.Writer"]:
         kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
         return lambda template: kind.unit(template, measured)
 
-    with store.Writer(folders.processed, unit, vars(task.fingerprint)) as writer:
-        yield writer
+    return store.Writer(folders.processed, unit, vars(task.fingerprint))
 
 
 def _made(writer: "store.Writer") -> dict[str, str]:

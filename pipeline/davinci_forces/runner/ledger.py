@@ -167,7 +167,12 @@ class Ledger:
         if name not in self._digests:
             root, _, path = name.partition("/")
             file = f"{getattr(self.folders, root)}{os.sep}{path}"
-            self._digests[name] = _digest(file)
+            try:
+                self._digests[name] = digest(file)
+            except OSError:  # nearly all files exist, so this is faster than checking first
+                if os.path.isfile(file):
+                    raise
+                self._digests[name] = ""
         return self._digests[name]
 
     def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
@@ -232,12 +237,3 @@ def _read(file: str) -> Entry:
         os.path.basename(os.path.dirname(file)),
         os.path.basename(file).removesuffix(".json"),
     )
-
-
-def _digest(file: str) -> str:
-    try:
-        return digest(file)
-    except OSError:  # nearly all files exist, so this is faster than checking first
-        if os.path.isfile(file):
-            raise
-        return ""
