@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -61,7 +62,6 @@ def run(
     The trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
     find a better trajectory. A line is printed after each start, as the search may take minutes.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 

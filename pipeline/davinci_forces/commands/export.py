@@ -9,7 +9,9 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.exports import FORMATS
+from davinci_forces.files import write_folder
 from davinci_forces.runner.console import echo
 
 
@@ -30,9 +32,7 @@ def run(
     reports: Annotated[Path | None, Option(help="Folder for reports, instead of reports/ next to raw/.")] = None,
 ) -> None:
     """Run all stages that are not up to date, and write a folder of files, whole or not at all."""
-    from davinci_forces.errors import BadRequest
     from davinci_forces.exports import renderer
-    from davinci_forces.files import write_folder
     from davinci_forces.runner import ALL, runs
     from davinci_forces.runner.results.exported import permitted_export
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo, show_markdown
 
 DEFAULT_FILE = Path("davinci-forces-guide.html")
@@ -17,8 +19,6 @@ def run(
 ) -> None:
     """Show a topic or the list of topics in the terminal, or write the HTML file and say where it is."""
     from davinci_forces import guide
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
 
     page = guide.page(" ".join(topic)) if topic else None
     if not html:

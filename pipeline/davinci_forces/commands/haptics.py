@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -43,9 +45,6 @@ def _write_template(file: Path) -> None:
     """Write the shipped scenario to a new file; raises BadRequest if the file exists."""
     from importlib.resources import files
 
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
-
     if file.exists():
         raise BadRequest(f"{file} exists already; name another file, or move it away")
     write_bytes(file, files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
@@ -76,7 +75,6 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
 
 def _write_csv(file: Path, run: "HapticRun") -> None:
     """Write the motion and force of one hand, one row per step of the controller."""
-    from davinci_forces.files import write_bytes
 
     columns = run.t, run.plan_x, run.hand_x, run.arm_x, run.true_force, run.felt_force
     rows = zip(*(column.tolist() for column in columns), strict=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.files import visible
 from davinci_forces.runner.console import echo, table
 
 if TYPE_CHECKING:
@@ -37,8 +38,6 @@ def run(
     if as_json:
         echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        from davinci_forces.files import visible
-
         echo("\n".join(visible(line) for line in lines(description)))
 
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo, table
 
 
@@ -18,8 +20,6 @@ def run(
     show: Annotated[bool, Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml, and print what to check; an existing file is never overwritten."""
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
     from davinci_forces.study import template
 
     folder = study or (files[0] if template.is_folder(files[0]) else files[0].parent)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -54,7 +55,6 @@ def run(
 
 def _index(robot: "Robot") -> str:
     """The thesis chapter by chapter, with the results of `davinci-thesis` in `reports/` if it has run."""
-    from davinci_forces.errors import BadRequest, MissingRecord
     from davinci_forces.runner.results.dataframes import results
     from davinci_forces.simulation import thesis
 
@@ -69,7 +69,6 @@ def _index(robot: "Robot") -> str:
 
 def _values(option: str, text: str) -> list[float]:
     """Read numbers separated by commas."""
-    from davinci_forces.errors import BadRequest
     from davinci_forces.toml import unlikely
 
     values = []
@@ -95,7 +94,6 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     """
     import numpy as np
 
-    from davinci_forces.errors import BadRequest
     from davinci_forces.maths.mechanics import kinematics, tip_force
 
     chain = robot.chain

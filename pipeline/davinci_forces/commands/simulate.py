@@ -5,6 +5,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 
@@ -17,7 +18,6 @@ def run(
 
     If OUT holds the study.toml of this scenario, logs and truth.toml are written beside it, and no other file changes.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.simulation import study_folder
     from davinci_forces.simulation.scenario.reading import load
 

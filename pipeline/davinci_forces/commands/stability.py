@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -46,7 +47,6 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
     BadRequest
         If a parameter is impossible; all such parameters are named.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.haptics.maths.bimodal import Hand
     from davinci_forces.toml import unlikely
 

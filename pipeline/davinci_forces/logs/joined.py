@@ -60,10 +60,8 @@ class Joined(Log):
         self.parts = dict(zip(unique([Path(name.removesuffix(".gz")).stem for name in names]), parts, strict=True))
         self.lent = {f"{stem}/{n}": f"{stem}/{c}" for stem, part in self.parts.items() for n, c in part.lent.items()}
         starts = starts_of(parts)
-        self.offsets = dict.fromkeys(self.parts, 0.0)
-        if starts:
-            since = ((start - starts[0]).total_seconds() for start in starts)
-            self.offsets = dict(zip(self.parts, since, strict=True))
+        since = [(start - starts[0]).total_seconds() for start in starts] or [0.0] * len(parts)
+        self.offsets = dict(zip(self.parts, since, strict=True))
         self.remarks = [] if starts else [
             "not all joined files say when they started; their clocks are assumed to have the same zero"
         ]  # fmt: skip

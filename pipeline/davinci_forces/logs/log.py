@@ -122,7 +122,10 @@ class Log:
             If there is none, or more than one; the message lists the closest.
         """
         if isinstance(name, int):
-            return self._numbered(name)
+            written = [channel for channel in self.channels if not channel.derived]
+            if not 0 <= name < len(written):
+                raise BadLog(f"{self.path}: there is no column {name}; its {len(written)} columns are counted from 0")
+            return written[name]
         exact = [channel for channel in self.channels if channel.name == name]
         exact = exact or [channel for channel in self.channels if channel.alias == name]
         last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
@@ -177,12 +180,6 @@ class Log:
             by_name = {channel.name: channel for channel in self.channels}
             self._indexed = self.channels, by_name, {channel.time for channel in self.channels}
         return self._indexed[1:]
-
-    def _numbered(self, number: int) -> Channel:
-        written = [channel for channel in self.channels if not channel.derived]
-        if not 0 <= number < len(written):
-            raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
-        return written[number]
 
     def _restart(self, names: Sequence[str]) -> None:
         """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""

@@ -152,14 +152,13 @@ def _short(kind: str) -> str:
 class BagLog(Log):
     """An opened bag.  Times count from the first message of all topics."""
 
-    bag: Bag | None = None
+    bag: Bag = field(kw_only=True)
     topics: list[Topic] = field(default_factory=list)
     origin: int = 0  # [ns] since 1970
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         if not names:
             return
-        assert self.bag
         topic = next(t for t in self.topics if any(channel.name == names[0] for channel in t.channels(True)))
         number = 0  # of the first message of a batch
         for connections, batch in self.bag.batches(topic.connections):

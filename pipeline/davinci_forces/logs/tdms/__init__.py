@@ -13,7 +13,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, unique
 from davinci_forces.logs.tdms import samples
-from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, clocks_of
+from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, set_clocks
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBER_CODES, TIME, Objects, names
 from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, Queue, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
@@ -191,13 +191,11 @@ def _describe_time(
         name: Sampled(names(path)[0], sizes[name], kinds[name] == "time", timelines.get(path))
         for path, name in log.names.items()
     }
-    clocks = clocks_of(log.channels, sampled, log.cut)
-    log.channels, log.clock, log.time, log.made = clocks.channels, clocks.clock, clocks.time, clocks.made
-    log.lent = clocks.lent
+    log.made = set_clocks(log, sampled)
     starts = (words.get("wf_start_time") for path, words in properties.items() if path in log.names)
     if started := started or next((start for start in starts if isinstance(start, datetime)), None):
         log.zone, log.started = "UTC", started.replace(tzinfo=None).isoformat()
-    for name, timeline in clocks.made.items():
+    for name, timeline in log.made.items():
         if gaps := [f"{first}" for first in timeline.first[1:]]:
             some = ", ".join(gaps[:5]) + (" ..." if len(gaps) > 5 else "")
             log.warnings.append(
