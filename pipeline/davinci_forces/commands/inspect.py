@@ -54,10 +54,7 @@ class _Survey:
 def describe(file: Path, head: int, options: "Options | None" = None) -> dict[str, Any]:
     """Read a whole log, clock by clock, and describe it as JSON values, without NaN.
 
-    Raises
-    ------
-    BadLog
-        If it cannot be read.
+    Raises BadLog if it cannot be read.
     """
     from davinci_forces.logs import open_log
     from davinci_forces.logs.log import Options

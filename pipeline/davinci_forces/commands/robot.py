@@ -87,10 +87,7 @@ def _values(option: str, text: str) -> list[float]:
 def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
     """The printed quantities as JSON values.
 
-    Raises
-    ------
-    BadRequest
-        If the robot has no chain, or the length of q or dq is wrong.
+    Raises BadRequest if the robot has no chain, or the length of q or dq is wrong.
     """
     import numpy as np
 

@@ -50,10 +50,7 @@ class IdentifiedArm(NamedTuple):
 def render(export: Export) -> Rendering:
     """Render the URDF and the table beside it.
 
-    Raises
-    ------
-    BadRequest
-        If the robot has no chain, an effort is a current, or no log moves the joints together.
+    Raises BadRequest if the robot has no chain, an effort is a current, or no log moves the joints together.
     """
     robot, currents = export.study.robot, [joint.name for joint in export.joints if joint.joint.effort]
     missing = [f"effort in N m or N: that of {', '.join(currents)} is in A; state torque_constant"] * bool(currents)
@@ -80,10 +77,7 @@ def render(export: Export) -> Rendering:
 def consistent_fits(export: Export) -> list[Fit]:
     """The consistent fits of all moving joints as one arm: those in the records, or a new one from the same logs.
 
-    Raises
-    ------
-    BadRequest
-        If the export lacks a joint, or no identification log holds all joints and moves several of them.
+    Raises BadRequest if the export lacks a joint, or no identification log holds all joints and moves several of them.
     """
     from davinci_forces.identification.candidates import candidates, reach_of
     from davinci_forces.identification.chosen import select_candidate

@@ -37,10 +37,7 @@ def load(name: str, folder: Path) -> Robot:
 def read_with_problems(name: str, folder: Path) -> tuple[Robot | None, TomlFile | None]:
     """Load the robot as `load` does, None if its joints are unknown, and its file with its problems, if it has a file.
 
-    Raises
-    ------
-    BadRobot
-        If there is no such robot, or its file cannot be read at all.
+    Raises BadRobot if there is no such robot, or its file cannot be read at all.
     """
     for suffix, reader in READERS.items():
         if name.endswith(suffix):

@@ -42,11 +42,8 @@ class Outcome:
 def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
     """Run one task.  An error becomes its outcome, so that the other tasks go on.
 
-    Raises
-    ------
-    Exception
-        If the diagnostic of the error cannot be written, or the file `mark` is gone.  Then the run has ended, and the
-        next one may have removed what this task was writing.
+    Raises any error if its diagnostic cannot be written, or the file `mark` is gone.  Then the run has ended, and the
+    next one may have removed what this task was writing.
     """
     from davinci_forces.records import store  # here, so that a run in which all is up to date does not load pyarrow
 

@@ -62,10 +62,7 @@ class Runner:
     def run(self, names: Iterable[str]) -> bool:
         """Run these stages, groups or the report after the stages that they need; return whether all tasks succeeded.
 
-        Raises
-        ------
-        PipelineError
-            If another run is working on the study.
+        Raises PipelineError if another run is working on the study.
         """
         steps = self._steps(names)
         self.seconds = dict.fromkeys(map(stage_of, steps), 0.0)

@@ -48,11 +48,7 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     """Hash all files that a run reads and makes, compare the ledger with the plan, and render the report again.
 
     `report_id` is the expected one, or "" for any.  Without `pages`, only the numbers of the report are compared.
-
-    Raises
-    ------
-    NotReproduced
-        With all differences, one per line.
+    Raises NotReproduced with all differences, one per line.
     """
     ledger = Ledger(folders)
     recorded = known_files(ledger)

@@ -88,10 +88,7 @@ class Holding:
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     """Guess what the channels of a log hold; the joints of `robots` may be named in it.
 
-    Raises
-    ------
-    BadLog
-        Where the log is damaged.
+    Raises BadLog where the log is damaged.
     """
     numbers = [channel for channel in log.channels if channel.kind == "number" and not channel.derived]
     if not 0 < len(numbers) <= MAX_CHANNELS:
@@ -120,10 +117,7 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
 def clock_hint(log: Log) -> str:
     """Propose the times of a log without a clock: a channel, or a rate by its velocities; "" where neither is found.
 
-    Raises
-    ------
-    BadLog
-        Where the log is damaged.
+    Raises BadLog where the log is damaged.
     """
     names = [channel.name for channel in log.channels if channel.kind == "number" and not channel.derived]
     if has_clock(log) or named_time(log) or not 0 < len(names) <= MAX_CHANNELS or len(log.by_clock(names)) > 1:

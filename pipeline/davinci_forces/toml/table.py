@@ -193,10 +193,7 @@ TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read. Is it a log?
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
     """Read the whole of a file; its values are checked when they are taken from the table.
 
-    Raises
-    ------
-    PipelineError
-        Of that kind, if the file cannot be read or is not TOML.
+    Raises an error of that kind if the file cannot be read or is not TOML.
     """
     try:
         text = text_of(read_bytes(file, MAX_BYTES, TOO_LARGE), "utf-8-sig")

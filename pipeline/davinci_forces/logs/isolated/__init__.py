@@ -30,12 +30,8 @@ HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hol
 def read(path: Path, options: Options, reader: str, package: str = "", extra: str = "") -> Log:
     """Open a log in a child process; `reader` is a module that exports `open_in_child(path, options) -> Log`.
 
-    It may need an optional package, which the extra of this name installs.
-
-    Raises
-    ------
-    BadLog
-        If that package is not installed, or the log cannot be read within the limits.
+    It may need an optional package, which the extra of this name installs.  Raises BadLog if that package is not
+    installed, or the log cannot be read within the limits.
     """
     if package and find_spec(package) is None:
         raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")

@@ -27,10 +27,7 @@ def read_header(
 ) -> Header:
     """Read the lines before the first row; `body` are the cells of `width` columns.
 
-    Raises
-    ------
-    Unclear
-        If the last line has other columns than the rows, or holds numbers and text.
+    Raises Unclear if the last line has other columns than the rows, or holds numbers and text.
     """
     rows = [_fitted(line, body, delimiter, width) for line in lines]
     fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]

@@ -59,10 +59,7 @@ class Element:
 def read(file: Path) -> Element:
     """Read the outermost element of a file.
 
-    Raises
-    ------
-    BadRobot
-        If the file cannot be read, is not XML, or has a document type.
+    Raises BadRobot if the file cannot be read, is not XML, or has a document type.
     """
     try:
         text = read_bytes(file, MAX_BYTES, TOO_LARGE)
