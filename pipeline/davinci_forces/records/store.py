@@ -122,9 +122,10 @@ def _schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", longest: int | None = None) -> AnyRecord:
     """Read a record with its origin; `sha256`, where given, saves hashing the file.
 
-    A record of more than `longest` rows reads a column when it is accessed, and does not keep it.  Raises MissingRecord
-    if the file does not exist, and BadRecord if it is not a record of this kind and version; for a long one, also at
-    the access of a column.
+    A record of more than `longest` rows reads a column when it is accessed, and does not keep it.
+
+    Raises MissingRecord if the file does not exist, and BadRecord if it is not a record of this kind and version.  A
+    long record raises BadRecord also at the access of a column.
     """
     whole = folder / place
     with _opened(kind, whole) as file:

@@ -202,8 +202,8 @@ def seal(entry: Entry) -> str:
 def check(entry: Entry, stage: str, name: str) -> Entry:
     """Check that a run would write this entry under this stage and name, and return it.
 
-    Raises ValueError if the entry is of another task, or names a file that no stage writes, which a run would remove;
-    TypeError if a part of it has the wrong type.
+    Raises ValueError if the entry is of another task, or names a file that no stage writes, which a run would remove.
+    Raises TypeError if a part of it has the wrong type.
     """
     fingerprint = entry.fingerprint if isinstance(entry.fingerprint, dict) else {}
     tables = [entry.outputs, *map(fingerprint.get, PARTS)]

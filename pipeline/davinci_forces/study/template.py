@@ -98,8 +98,8 @@ def logs_in(paths: Sequence[Path]) -> list[Path]:
 def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft:
     """Draft a study.toml that names every channel of every log and guesses its content; "" guesses the robot, too.
 
-    Raises BadRequest if a log or the robot's file lies outside the study's folder, or there is no log; BadLog if no log
-    can be read, with the reason for each; BadRobot if the robot cannot be read.
+    Raises BadRequest if a log or the robot's file lies outside the study's folder, or there is no log.  Raises BadRobot
+    if the robot cannot be read, and BadLog with the reason for each log if none can be read.
     """
     for file in files:
         if not file.resolve().is_relative_to(folder.resolve()):
