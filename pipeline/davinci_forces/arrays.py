@@ -29,9 +29,8 @@ from davinci_forces.records import (
     store,
 )
 from davinci_forces.report.content import Number
-from davinci_forces.report.report import align
 from davinci_forces.robots import Robot
-from davinci_forces.runner.console import Console
+from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
 from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.runs import folders
@@ -231,11 +230,11 @@ class IdentifiedArm:
 
     def __repr__(self) -> str:
         """The parameters as a table: joint, parameter, value ± standard error, unit."""
-        table = [("joint", "parameter", "value", "unit")]
+        lines = [("joint", "parameter", "value", "unit")]
         for fit in self.record:
             rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
-            table += [(fit.group, name, Number(value, std=std).text, unit) for name, value, std, unit in rows]
-        return "\n".join(align(table))
+            lines += [(fit.group, name, Number(value, std=std).text, unit) for name, value, std, unit in rows]
+        return "\n".join(table(lines))
 
     def _repr_html_(self) -> str:
         return as_html([self.parameters.set_index("group")], self.diagnostics)

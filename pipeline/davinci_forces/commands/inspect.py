@@ -51,16 +51,15 @@ class _Survey:
     rows: int = 0
 
 
-def describe(file: Path, head: int, options: "Options | None" = None) -> dict[str, Any]:
+def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
     """Read a whole log, clock by clock, and describe it as JSON values, without NaN.
 
     Raises BadLog if it cannot be read.
     """
     from davinci_forces.logs import open_log
-    from davinci_forces.logs.log import Options
     from davinci_forces.study.timing import named_time
 
-    log = open_log(file, options or Options())
+    log = open_log(file, options)
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
     source, warnings = named_time(log), list[str]()
     surveys: dict[str, _Survey] = {}

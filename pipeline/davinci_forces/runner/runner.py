@@ -174,11 +174,9 @@ class Runner:
             for reason, names in _grouped(progress.reasons).items():
                 self.console.say(f"{_listed(stage_of(step), names)}: {reason}")
             progress.reasons.clear()
-        function = (
-            partial(reporting.perform, self.ledger)
-            if step == REPORT
-            else partial(self.perform or perform, self.folders)
-        )
+        function = partial(self.perform or perform, self.folders)
+        if step == REPORT:
+            function = partial(reporting.perform, self.ledger)
         for part, tasks in due.items():
             self._due[part] = len(tasks) + 1
             for task in tasks:

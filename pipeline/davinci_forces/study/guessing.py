@@ -99,19 +99,19 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
         holding = max(by_numbers(numbers), by_words(numbers), key=lambda h: len(h.meanings))
     if holding.is_complete:
         return _read_motion(log, holding)
-    if any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
-        times = [channel.name for channel in numbers if is_time(channel)]
-        samples = {name: samples_of(log, [name])[name] for name in times}
-        timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
-        by_name = timing.missing and times and not has_clock(log)
-        content = _by_content(log, [channel.name for channel in numbers])
-        if any(robot.file and len(robot.joints) == content.joints for robot in robots):
-            check = {
-                n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
-            }
-            return replace(content, meanings=check)
-        return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
-    return _by_content(log, [channel.name for channel in numbers])
+    content = _by_content(log, [channel.name for channel in numbers])
+    if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
+        return content
+    if any(robot.file and len(robot.joints) == content.joints for robot in robots):
+        check = {
+            n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
+        }
+        return replace(content, meanings=check)
+    times = [channel.name for channel in numbers if is_time(channel)]
+    samples = {name: samples_of(log, [name])[name] for name in times}
+    timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
+    by_name = timing.missing and times and not has_clock(log)
+    return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
 
 
 def clock_hint(log: Log) -> str:

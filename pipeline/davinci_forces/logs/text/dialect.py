@@ -69,7 +69,7 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     first = _first_row(lines, delimiter, kinds, NUMBERS[decimal], stamps, options)
     if options.header is None and _are_numbers_of_columns(split_cells(lines[first], delimiter), columns, decimal):
         first, options = first + 1, replace(options, header=True)
-    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, len(kinds), options)
+    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, options)
     stamps = _from_first_row(stamps, [split_cells(line, delimiter) for line in lines[first:]], len(kinds))
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
     unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := _why_text(columns[i]))}
