@@ -187,6 +187,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     units = {channel.name: stated_unit(channel) for channel in channels}
     meanings: dict[str, Meaning] = {}
     for symbol, group in groups.items():
+        usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(group.words) else ""
         for label, name in group.names.items():
             if label.isdecimal() and len(numbers) == len(labels):
                 joint, reason = int(label) - first, "by the number in its name"
@@ -194,9 +195,8 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
                 joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
             else:
                 continue
-            unit = "" if units[name] else _usual(symbol, group.words)
             motor = AT_MOTOR.get(symbol, symbol) if "motor" in words_of(name) else symbol
-            meanings[name] = Meaning(motor, joint, reason, unit)
+            meanings[name] = Meaning(motor, joint, reason, "" if units[name] else usual)
     meanings = _with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
@@ -219,11 +219,6 @@ def by_words(channels: Sequence[Channel]) -> Holding:
         for symbol, names in named.items() for label, name in names.items() if label in labels
     }  # fmt: skip
     return Holding(_with_one_effort(meanings), len(labels), tuple(labels))
-
-
-def _usual(symbol: str, words: Sequence[str]) -> str:
-    """The unit that a recorder is known to use: degrees of Kinova's actuators and of KUKA's AIPos."""
-    return {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(words) else ""
 
 
 def _by_content(log: Log, names: Sequence[str]) -> Holding:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -107,7 +106,8 @@ class TdmsLog(Log):
             row += count
 
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        paths = [self._path_of[name] for name in dict.fromkeys(asked_for)]
+        path_of = {name: path for path, name in self.names.items()}
+        paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.groups([path for path in paths if path not in self.scaled])
         scaled = self.index.groups([path for path in paths if path in self.scaled])
         with open_file(self.path) as file:
@@ -115,10 +115,6 @@ class TdmsLog(Log):
             for block, lacking in side_by_side(queues, rows_of(len(paths))):
                 missing = {self.names[path]: count for path, count in lacking.items()}
                 yield self.count_nans({self.names[path]: samples for path, samples in block.items()}, missing)
-
-    @cached_property
-    def _path_of(self) -> dict[str, str]:
-        return {name: path for path, name in self.names.items()}
 
     def _source(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         if paths[0] in self.scaled:
