@@ -6,6 +6,7 @@ import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -91,12 +92,7 @@ def refuse(table: TomlTable) -> None:
 def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[str]:
     """The joints of the columns of a position: as named, else by names of a DataFrame, else all joints of the robot.
 
-    Raises
-    ------
-    BadRequest
-        If neither names nor the number of columns tell the joints.
-    BadRobot
-        If the robot has no such joint.
+    Raises BadRequest if neither names nor the number of columns tell the joints; BadRobot if there is no such joint.
     """
     names = [joint.name for joint in robot.joints]
     labels = [str(label) for label in q.columns] if isinstance(q, pd.DataFrame) else []
@@ -358,7 +354,5 @@ def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:
 
 def as_html(tables: Sequence[pd.DataFrame], texts: Sequence[str]) -> str:
     """Tables, with numbers of four digits, and a list of texts as HTML."""
-    from html import escape
-
     parts = [table.to_html(float_format=lambda x: f"{x:.4g}") for table in tables]
     return "".join([*parts, *(f"<p>{escape(text)}</p>" for text in texts)])

@@ -16,7 +16,7 @@ from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
 from time import sleep
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -26,12 +26,9 @@ from davinci_forces.commands import COMMANDS
 from davinci_forces.errors import PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.runner import ALL
-from davinci_forces.runner.console import echo
+from davinci_forces.runner.console import Verbosity, echo
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.stages import GROUPS, module
-
-if TYPE_CHECKING:
-    from davinci_forces.runner.console import Verbosity
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM
 STOP_TIMEOUT = 3.0  # [s] from a stop signal to the forced end of the process
@@ -200,7 +197,7 @@ def options(version: Version = False) -> None:
     """Declare the options of the program itself: only --version, which `print_version` handles."""
 
 
-def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
+def verbosity(quiet: bool, verbose: bool) -> Verbosity:
     """Return the verbosity of a run; raises typer.BadParameter if both options are set."""
     if quiet and verbose:
         raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")

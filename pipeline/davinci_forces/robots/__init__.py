@@ -18,10 +18,7 @@ __all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
 def load(name: str, folder: Path) -> Robot:
     """Load a listed robot by its name, or read a robot from a .toml or .urdf file in the folder.
 
-    Raises
-    ------
-    BadRobot
-        If there is no such robot or file, or the file has problems; the message lists each with its line.
+    Raises BadRobot if there is no such robot or file, or the file has problems; the message lists each with its line.
     """
     if name.endswith(FILES) and not (folder / name).exists():
         raise BadRobot(
