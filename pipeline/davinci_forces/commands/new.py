@@ -30,9 +30,9 @@ def run(
     target = folder / "study.toml"
     if target.exists():
         raise BadRequest(f"{target} exists already; move it away, or print the new one with --print")
-    if draft.robot_file:
-        write_bytes(folder / draft.robot_file, draft.robot_text.encode())
-        echo(f"{folder / draft.robot_file}: {draft.robot_reason}; check the kinds of its joints and their terms")
+    if draft.arm.text:
+        write_bytes(folder / draft.arm.name, draft.arm.text.encode())
+        echo(f"{folder / draft.arm.name}: {draft.arm.reason}; check the kinds of its joints and their terms")
     write_bytes(target, draft.text.encode())
     echo("\n".join(table([("file", "role", "rate", "joints", "look at"), *draft.rows])))
     if all(row.role in ("left out", "-") for row in draft.rows):

@@ -92,7 +92,7 @@ def without_folders(message: str, folders: Folders) -> str:
 def arguments(folders: Folders, task: Task) -> dict[str, Any]:
     """The keyword arguments of a task's function."""
     asks = declaration(task.step)
-    values: dict[str, Any] = dict(task.settings)
+    values: dict[str, Any] = dict(task.fingerprint.settings)
     for parameter, located in task.records.items():
         if parameter in asks.in_turn:
             values[parameter] = InTurn(folders, task, located)

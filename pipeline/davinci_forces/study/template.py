@@ -48,13 +48,11 @@ class Row(NamedTuple):
 
 
 class Draft(NamedTuple):
-    """The text of a study.toml, the file of its robot where that has to be written, too, and a row for each log."""
+    """The text of a study.toml, its robot, whose file may have to be written, too, and a row for each log."""
 
     text: str
-    robot_file: str = ""
-    robot_text: str = ""
-    rows: tuple[Row, ...] = ()
-    robot_reason: str = ""
+    arm: Arm
+    rows: tuple[Row, ...]
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
         rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
-    return Draft(text, arm.name if arm.text else "", arm.text, tuple(rows), arm.reason)
+    return Draft(text, arm, tuple(rows))
 
 
 def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
