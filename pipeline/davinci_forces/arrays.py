@@ -144,7 +144,7 @@ class IdentifiedArm:
         logs: Sequence[Columns],
         periods: Sequence[float | None],
     ) -> None:
-        self.robot, self.joints, self._signals = robot, tuple(joints), sorted({n.rpartition(".")[2] for n in logs[0]})
+        self.robot, self.joints = robot, tuple(joints)
         home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
         folder = home / "raw" / "arrays"

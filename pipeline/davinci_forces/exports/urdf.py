@@ -42,7 +42,6 @@ class IdentifiedArm(NamedTuple):
     robot: Robot
     fit: Fit
     model: CoupledArm
-    inertial: Array  # (L, 10) parameters of the links
     friction: dict[str, tuple[float, float]]  # viscous and Coulomb, by joint
     remainder: dict[ModelTerm, float]  # what URDF cannot hold
 
@@ -117,7 +116,7 @@ def completed_arm(robot: Robot, fit: Fit) -> IdentifiedArm:
     drives = [ModelTerm(name, term) for term in DRIVE for name in model.efforts]
     values = dict(zip([*drives, *terms_of(model)[base:]], x[L:].tolist(), strict=True))
     friction = {j: (values.pop(ModelTerm(j, viscous)), values.pop(ModelTerm(j, coulomb))) for j in model.efforts}
-    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, inertial, friction, values)
+    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, friction, values)
 
 
 def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: ArmMotion) -> Array:
