@@ -217,7 +217,7 @@ def test_a_chunk_unpacked_piece_by_piece_holds_the_same_samples(tmp_path, monkey
         shuffled = file.create_dataset("y", data=values, chunks=chunks, compression="gzip", shuffle=True)
         assert isinstance(datasets._opened(file, plain.ref, axis), datasets.Unpacked)
         assert isinstance(datasets._opened(file, shuffled.ref, axis), h5py.Dataset)
-    log = datasets.open_in_child(tmp_path / "log.h5", datasets.Options())
+    log = datasets.open_in_child(tmp_path / "log.h5")
     for _ in range(2):  # from the start again, too
         blocks = list(log.blocks([channel.name for channel in log.channels]))
         columns = [np.concatenate([block[c.name] for block in blocks]) for c in log.channels]

@@ -80,7 +80,7 @@ def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
         "clocks": [_clock(log, clock, s.statistics) | {"channels": [*s.first]} for clock, s in surveys.items()],
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
-        "warnings": [*warnings, *_flags(log, source, main.statistics)],
+        "warnings": [*warnings, *_flags(source, main.statistics)],
         "head": {name: [_plain(value) for value in first[name]] for name in names},
     }  # fmt: skip
 
@@ -137,7 +137,7 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
     return labels | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
 
 
-def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
+def _flags(source: str, clock: "ClockStatistics") -> Iterator[str]:
     """Warnings about a clock: repeated rows, times that do not increase, jitter and gaps."""
     if clock.duplicates > MAX_REPEATED_OR_JITTER * clock.samples:
         share = clock.duplicates / clock.samples

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.log import Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import Block, Channel, Log, unique
 from davinci_forces.logs.ros.layout import Layout, Unlike, layout_of, numbers_at, stamps_at
 from davinci_forces.logs.ros.scan import Batch
 from davinci_forces.logs.ros.storage import Bag, types_of
@@ -55,7 +55,7 @@ class Topic:
         return bool(self.first.joints and layout.joints) and not set(self.first.joints) & set(layout.joints)
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the bag; raises BadLog if none of its topics has numbers."""
     bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag, cut=bag.cut, warnings=bag.warnings)
