@@ -202,15 +202,9 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf"):
         by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
-        yield from _in_amperes([joint for k, joint in enumerate(robot.joints) if k in by_current])
-
-
-def _in_amperes(joints: Sequence[Joint]) -> Iterator[str]:
-    """Lines that make currents the effort of joints, as a URDF has no torque constants."""
-    for joint in joints:
-        yield ""
-        yield f"[robot_overrides.{joint.name}]"
-        yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
+        for joint in (joint for k, joint in enumerate(robot.joints) if k in by_current):  # a URDF states no drives
+            yield from ("", f"[robot_overrides.{joint.name}]")
+            yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
@@ -404,10 +398,9 @@ def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
 
 def _time_line(channel: Channel, size: float, reason: str) -> str:
     """The line of a channel of times, with its unit where the log does not state one that is known."""
-    units = {1.0: "", 1e-3: ', unit = "ms"'}
     if measures(canonical(channel.unit)) == "time" or size == 1.0:
         return f"time = {_text(channel.name)}  # {reason}"
-    unit = units.get(size, f', scale = {size!r}, unit = "s"')
+    unit = ', unit = "ms"' if size == 1e-3 else f', scale = {size!r}, unit = "s"'
     return f"time = {{ channel = {_text(channel.name)}{unit} }}  # {reason}"
 
 
