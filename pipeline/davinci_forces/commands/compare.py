@@ -10,14 +10,13 @@ import sys
 from collections import Counter
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.report.changes import RANKS, Change, StatedValue, by_joint, changes
 from davinci_forces.runner.console import echo, table
-
-if TYPE_CHECKING:
-    from davinci_forces.report.changes import Change, StatedValue
+from davinci_forces.runner.results import stated
 
 LARGEST = 10  # changes of a joint that are listed
 
@@ -33,9 +32,7 @@ def run(
 
     Within a rank, the largest changes in standard errors come first.
     """
-    from davinci_forces.report.changes import changes
     from davinci_forces.runner import runs
-    from davinci_forces.runner.results import stated
 
     files = runs.results_of(a, reports), runs.results_of(b, reports)
     before, after = (stated.read(file) for file in files)
@@ -52,7 +49,7 @@ def run(
     echo("\n".join(_lines(differing, before, after, sys.maxsize if every else LARGEST)))
 
 
-def _row(change: "Change") -> dict[str, Any]:
+def _row(change: Change) -> dict[str, Any]:
     """One change as JSON values: null for an absent number, text for NaN and infinity, which JSON does not have."""
     a, b = (_plain(number.value) if number else None for number in (change.before, change.after))
     return {"key": change.key, "a": a, "b": b, "std": _plain(change.std), "z": change.z}
@@ -63,12 +60,11 @@ def _plain(value: Any) -> Any:
 
 
 def _lines(
-    differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"], most: int
+    differing: list[Change], before: dict[str, StatedValue], after: dict[str, StatedValue], most: int
 ) -> list[str]:
     """The comparison as lines of text, with at most `most` changes of a joint."""
-    from davinci_forces.report.changes import RANKS, by_joint
 
-    def counts(some: list["Change"]) -> str:
+    def counts(some: list[Change]) -> str:
         number = Counter(change.subject for change in some)
         return ": " + ", ".join(f"{number[about]} of {about}" for about in RANKS if number[about]) if some else ""
 
@@ -94,14 +90,14 @@ def _lines(
     return lines
 
 
-def _cells(change: "Change") -> tuple[str, ...]:
+def _cells(change: Change) -> tuple[str, ...]:
     assert change.before
     assert change.after
     std, z = (None if x is None else format(x, spec) for x, spec in ((change.std, ".2g"), (change.z, "+.1f")))
     return (change.subject, change.key, *_pair(change.before, change.after), std or "", z or "")
 
 
-def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
+def _pair(a: StatedValue, b: StatedValue) -> tuple[str, str]:
     """Two values with their units, in at least 5 digits and as many as show the difference."""
     from davinci_forces.report.results import format_unit
 
