@@ -3,7 +3,7 @@
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from davinci_forces.haptics.scenario import HapticScenario
     from davinci_forces.records import HapticRun
 
-Answer = dict[str, object]
+Answer = dict[str, Any]
 
 
 def run(
@@ -87,9 +87,9 @@ def _format_text(answer: Answer) -> str:
     """The results as text, one paragraph per hand."""
     lines = [f"{answer['title']}, simulated, against tissue of {answer['tissue_stiffness']:.4g} N/m.", ""]
     lines += ["Frequency, felt stiffness in % of the true one, and delay of the felt force:"]
-    lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"
-              for row in answer["response"]]  # type: ignore[attr-defined]  # fmt: skip
-    for name, hand in answer["hands"].items():  # type: ignore[attr-defined]
+    for row in answer["response"]:
+        lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"]
+    for name, hand in answer["hands"].items():
         lines += [
             "",
             f"Hand {name!r} of m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m:",
