@@ -1,10 +1,12 @@
-"""Records read back: whole, or column by column where they are long."""
+"""What all records have in common, and records read back: whole, or column by column where they are long."""
+
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
 
 from davinci_forces.errors import BadRecord
-from davinci_forces.records import PeriodResidual, store
+from davinci_forces.records import KINDS, PeriodResidual, store
 
 ROWS = 1000
 
@@ -17,6 +19,14 @@ def written(tmp_path):
     record = PeriodResidual("log", "joint", t=t, q_noise=q, dq_noise=dq, tau_noise=tau)
     with store.Writer(tmp_path, lambda record: lambda template: template, {}) as writer:
         return tmp_path, writer.write(record), record
+
+
+@pytest.mark.parametrize("kind", KINDS.values())
+def test_every_record_is_frozen_and_equals_itself_alone(kind):
+    """Its columns are arrays, which have no one truth to compare by."""
+    with pytest.raises(FrozenInstanceError):
+        setattr(object.__new__(kind), kind.KEY[0], "another")
+    assert kind.__eq__ is object.__eq__
 
 
 def test_a_long_record_holds_no_column_and_has_them_all(written):

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from davinci_forces import robots
 from davinci_forces.errors import BadRobot
 from davinci_forces.robots.from_toml import robot_of
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 from tests import arm
 from tests.test_study import ANYTHING, ARM, places_of
 

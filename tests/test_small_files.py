@@ -11,8 +11,7 @@ import pytest
 
 from davinci_forces.errors import BadStudy
 from davinci_forces.study import reading
-from davinci_forces.toml.file import MOST_PROBLEMS
-from davinci_forces.toml.lines import MAX_TABLES
+from davinci_forces.toml.lines import MAX_TABLES, MOST_PROBLEMS
 from tests.logs.array_writers import SIGNATURE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="what a process took is told by POSIX")
@@ -218,7 +217,7 @@ def test_a_chunk_unpacked_piece_by_piece_holds_the_same_samples(tmp_path, monkey
         shuffled = file.create_dataset("y", data=values, chunks=chunks, compression="gzip", shuffle=True)
         assert isinstance(datasets._opened(file, plain.ref, axis), datasets.Unpacked)
         assert isinstance(datasets._opened(file, shuffled.ref, axis), h5py.Dataset)
-    log = datasets.open_in_child(tmp_path / "log.h5", datasets.Options())
+    log = datasets.open_in_child(tmp_path / "log.h5")
     for _ in range(2):  # from the start again, too
         blocks = list(log.blocks([channel.name for channel in log.channels]))
         columns = [np.concatenate([block[c.name] for block in blocks]) for c in log.channels]

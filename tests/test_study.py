@@ -16,8 +16,7 @@ from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.fingerprints.fingerprint import hash_of
 from davinci_forces.runner.reporting import study_files
 from davinci_forces.study import reading
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 from tests.arm import write_study
 from tests.test_runs import call
 

@@ -6,6 +6,7 @@ import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -25,22 +26,19 @@ from davinci_forces.records import (
     ErrorBand,
     Fit,
     JointModel,
-    Record,
     Track,
     store,
 )
 from davinci_forces.report.content import Number
-from davinci_forces.report.report import align
 from davinci_forces.robots import Robot
-from davinci_forces.runner.console import Console
+from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
 from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.runs import folders
 from davinci_forces.study import LogEntry, Settings, Study
 from davinci_forces.study.entries import entries_of
 from davinci_forces.study.reading import settings_of
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 
 IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
 NEW = "new"  # the log that is predicted, or whose external effort is estimated
@@ -94,12 +92,7 @@ def refuse(table: TomlTable) -> None:
 def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[str]:
     """The joints of the columns of a position: as named, else by names of a DataFrame, else all joints of the robot.
 
-    Raises
-    ------
-    BadRequest
-        If neither names nor the number of columns tell the joints.
-    BadRobot
-        If the robot has no such joint.
+    Raises BadRequest if neither names nor the number of columns tell the joints; BadRobot if there is no such joint.
     """
     names = [joint.name for joint in robot.joints]
     labels = [str(label) for label in q.columns] if isinstance(q, pd.DataFrame) else []
@@ -151,7 +144,7 @@ class IdentifiedArm:
         logs: Sequence[Columns],
         periods: Sequence[float | None],
     ) -> None:
-        self.robot, self.joints, self._signals = robot, tuple(joints), sorted({n.rpartition(".")[2] for n in logs[0]})
+        self.robot, self.joints = robot, tuple(joints)
         home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
         folder = home / "raw" / "arrays"
@@ -213,7 +206,7 @@ class IdentifiedArm:
         texts = new_texts(reading)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
-        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(map(self._effort_label, tracks)), texts)
+        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(self._effort_label(t.joint) for t in tracks), texts)
 
     def plot(self) -> Any:
         """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
@@ -225,7 +218,7 @@ class IdentifiedArm:
                 ax.plot(t, model.tau, "C0", lw=0.7, label="" if i else "measured")
                 ax.plot(t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
                 shift = t[-1]
-            ax.set_ylabel(self._effort_label(self.fits[joint], joint))
+            ax.set_ylabel(self._effort_label(joint))
             ax.set_title(joint, loc="left", fontsize="medium")
         axes[0].legend(loc="upper right")
         axes[-1].set_xlabel("time [s]")
@@ -233,17 +226,17 @@ class IdentifiedArm:
 
     def __repr__(self) -> str:
         """The parameters as a table: joint, parameter, value ± standard error, unit."""
-        table = [("joint", "parameter", "value", "unit")]
+        lines = [("joint", "parameter", "value", "unit")]
         for fit in self.record:
             rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
-            table += [(fit.group, name, Number(value, std=std).text, unit) for name, value, std, unit in rows]
-        return "\n".join(align(table))
+            lines += [(fit.group, name, Number(value, std=std).text, unit) for name, value, std, unit in rows]
+        return "\n".join(table(lines))
 
     def _repr_html_(self) -> str:
         return as_html([self.parameters.set_index("group")], self.diagnostics)
 
-    def _effort_label(self, record: Any, joint: str = "") -> str:
-        return f"effort [{self.robot.joint(joint or record.joint).unit('{effort}')}]"
+    def _effort_label(self, joint: str) -> str:
+        return f"effort [{self.robot.joint(joint).unit('{effort}')}]"
 
     def _prediction(self, model: JointModel) -> pd.DataFrame:
         std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
@@ -345,9 +338,8 @@ def axes_of(joints: int) -> Any:
     """One axes a joint (joints,), below each other."""
     from matplotlib import pyplot
 
-    return pyplot.subplots(joints, 1, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")[1][
-        :, 0
-    ]
+    _, axes = pyplot.subplots(joints, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")
+    return axes[:, 0]
 
 
 def new_texts(reading: Any) -> tuple[str, ...]:
@@ -355,14 +347,12 @@ def new_texts(reading: Any) -> tuple[str, ...]:
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
 
 
-def texts_of(diagnostics: Iterable[Record]) -> tuple[str, ...]:
+def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:
     """The texts of diagnostics, without duplicates."""
-    return tuple(dict.fromkeys(str(text) for d in diagnostics if isinstance(d, Diagnostic) for text in d.text))
+    return tuple(dict.fromkeys(str(text) for d in diagnostics for text in d.text))
 
 
 def as_html(tables: Sequence[pd.DataFrame], texts: Sequence[str]) -> str:
     """Tables, with numbers of four digits, and a list of texts as HTML."""
-    from html import escape
-
     parts = [table.to_html(float_format=lambda x: f"{x:.4g}") for table in tables]
     return "".join([*parts, *(f"<p>{escape(text)}</p>" for text in texts)])

@@ -16,21 +16,19 @@ from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
 from time import sleep
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperCommand, TyperGroup
 
 from davinci_forces.commands import COMMANDS
 from davinci_forces.errors import PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.runner import ALL
-from davinci_forces.runner.console import echo
+from davinci_forces.runner.console import Verbosity, echo
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.stages import GROUPS, module
-
-if TYPE_CHECKING:
-    from davinci_forces.runner.console import Verbosity
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM
 STOP_TIMEOUT = 3.0  # [s] from a stop signal to the forced end of the process
@@ -78,18 +76,18 @@ app = typer.Typer(
     rich_markup_mode="markdown",  # the default omits units in square brackets
 )
 
-StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, with its study.toml.")]
-Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")]
-Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ next to raw/.")]
-Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ next to raw/.")]
-Force = Annotated[bool, typer.Option("--force", help="Run the stages of this command even if they are up to date.")]
-Jobs = Annotated[int, typer.Option(min=1, help="Number of processes to run tasks in.")]
+StudyFolder = Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")]
+Studies = Annotated[list[Path] | None, Argument(help="Folders of studies; without any, all studies in raw/.")]
+Processed = Annotated[Path | None, Option(help="Folder for processed files, instead of processed/ next to raw/.")]
+Reports = Annotated[Path | None, Option(help="Folder for reports, instead of reports/ next to raw/.")]
+Force = Annotated[bool, Option("--force", help="Run the stages of this command even if they are up to date.")]
+Jobs = Annotated[int, Option(min=1, help="Number of processes to run tasks in.")]
 Cluster = Annotated[
-    str, typer.Option(metavar="ADDRESS", help="Run tasks on the Dask cluster of this scheduler: tcp://host:8786.")
+    str, Option(metavar="ADDRESS", help="Run tasks on the Dask cluster of this scheduler: tcp://host:8786.")
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Print what would run and why, and change nothing.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the time of each task as it ends.")]
+DryRun = Annotated[bool, Option("--dry-run", help="Print what would run and why, and change nothing.")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print warnings and errors only.")]
+Verbose = Annotated[bool, Option("--verbose", "-v", help="Also print the time of each task as it ends.")]
 
 
 class ShownAsWritten(TyperCommand):
@@ -165,19 +163,19 @@ def errors_as_messages() -> Iterator[None]:
     """Print errors of the pipeline and of the system without a traceback, and exit with code 1."""
     try:
         yield
+        return
     except BrokenPipeError:  # the reader of the output has closed the pipe
         raise
     except (PipelineError, OSError) as error:
-        echo(f"error: {error}", fg="red", err=True)
-        raise typer.Exit(1) from None
+        message = f"{error}"
     except UnicodeEncodeError as error:
         excerpt = error.object[max(error.start - 40, 0) : error.end + 40]
-        echo(f"error: a name is not in UTF-8: {excerpt!r}; rename the file or the folder", fg="red", err=True)
-        raise typer.Exit(1) from None
+        message = f"a name is not in UTF-8: {excerpt!r}; rename the file or the folder"
     except BrokenExecutor:
-        message = "a worker process was killed, perhaps because memory ran out; finished tasks are kept"
-        echo(f"error: {message}; run again with fewer --jobs", fg="red", err=True)
-        raise typer.Exit(1) from None
+        lost = "a worker process was killed, perhaps because memory ran out; finished tasks are kept"
+        message = f"{lost}; run again with fewer --jobs"
+    echo(f"error: {message}", fg="red", err=True)
+    raise typer.Exit(1) from None
 
 
 def print_version(is_requested: bool) -> None:
@@ -190,7 +188,7 @@ def print_version(is_requested: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", callback=print_version, is_eager=True, help="Print the version and exit.")
+    bool, Option("--version", callback=print_version, is_eager=True, help="Print the version and exit.")
 ]
 
 
@@ -199,7 +197,7 @@ def options(version: Version = False) -> None:
     """Declare the options of the program itself: only --version, which `print_version` handles."""
 
 
-def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
+def verbosity(quiet: bool, verbose: bool) -> Verbosity:
     """Return the verbosity of a run; raises typer.BadParameter if both options are set."""
     if quiet and verbose:
         raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")

@@ -49,10 +49,7 @@ def _opener(file: str, flags: int) -> int:
 def require_file(file: Path | str | int, name: str = "") -> None:
     """Check that a path is a regular file, before a library opens it.
 
-    Raises
-    ------
-    NotAFile
-        If it is a pipe, a device, a socket or a folder.
+    Raises NotAFile if it is a pipe, a device, a socket or a folder.
     """
     if not stat.S_ISREG(mode := os.stat(file).st_mode):
         what = KINDS.get(stat.filemode(mode)[0], "a device")
@@ -62,10 +59,8 @@ def require_file(file: Path | str | int, name: str = "") -> None:
 def read_bytes(file: Path | str, most: int = MAX_BYTES, beyond: str = "more than is read whole") -> bytes:
     """Read a regular file of at most `most` bytes; `beyond` ends the message about a larger one.
 
-    Raises
-    ------
-    NotAFile
-        If it is not a regular file, or has more bytes, whatever size the system states: 0 for a file of /proc.
+    Raises NotAFile if it is not a regular file, or has more bytes, whatever size the system states: 0 for a file of
+    /proc.
     """
     with open(file, "rb", buffering=0, opener=_opener) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -113,10 +108,7 @@ def write_together(contents: Mapping[Path, bytes]) -> None:
 def write_folder(folder: Path, contents: Mapping[str, bytes], replaces: bool = False) -> None:
     """Write a folder of files, by name, completely or not at all.
 
-    Raises
-    ------
-    NotAFile
-        If the folder exists and is not to be replaced, or holds anything but files of these names.
+    Raises NotAFile if the folder exists and is not to be replaced, or holds anything but files of these names.
     """
     partial, before = temporary_name()(folder), temporary_name()(folder)
     try:
@@ -156,10 +148,7 @@ def visible(text: str, keep: str = "") -> str:
 def leftovers(folder: Path) -> Iterator[Path]:
     """Yield the incomplete files of an interrupted run.
 
-    Raises
-    ------
-    BadRequest
-        If a folder in it is a link, through which a run would write elsewhere.
+    Raises BadRequest if a folder in it is a link, through which a run would write elsewhere.
     """
     for home, folders, files in os.walk(folder):  # takes a third of the time of rglob
         for name in folders:

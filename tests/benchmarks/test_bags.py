@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from rosbags import rosbag1, rosbag2
 
-from davinci_forces.logs.log import Options
 from davinci_forces.logs.ros.bag import open_in_child
 from tests.benchmarks.reading import Report
 from tests.logs.bag_writer import _store, joint_state, write
@@ -18,7 +17,7 @@ LEAST = {"log.bag": 5.0, "log": 3.5, "log_mcap": 5.0}  # SQLite makes an object 
 
 def ours(path: Path) -> float:
     """Open a bag and read all its channels, in this process: the sum of one."""
-    log = open_in_child(path, Options())
+    log = open_in_child(path)
     blocks = log.blocks([channel.name for channel in log.channels])
     return sum(float(block["/PSM1/measured_js/effort[6]"].sum()) for block in blocks)
 

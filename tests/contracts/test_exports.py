@@ -251,14 +251,19 @@ def beside_bodies(arm, moved):
     return tau
 
 
+def inertial(arm: urdf.IdentifiedArm) -> np.ndarray:
+    """The inertial parameters (L, 10) of the links."""
+    return arm.robot.bodies.parameters(arm.model.chain.n).reshape(-1, 10)
+
+
 @pytest.mark.parametrize("robot", [DAVINCI, PSM], ids=["davinci", "psm"])
 def test_the_urdf_and_what_is_listed_beside_it_are_the_fit(robot):
     arm, moved, tau = identified_arm(robot)
     rigid = rigid_body_efforts(arm.robot, moved)
     assert_allclose(rigid + beside_bodies(arm, moved), tau, rtol=0, atol=1e-8 * np.abs(tau).max())
-    J = pseudo_inertias(arm.inertial)
+    J = pseudo_inertias(inertial(arm))
     assert (np.linalg.eigvalsh(J)[:, 0] >= -1e-12).all()
-    assert (arm.inertial[:, 0] >= 0).all()
+    assert (inertial(arm)[:, 0] >= 0).all()
 
 
 @pytest.mark.parametrize("robot", [DAVINCI, PSM], ids=["davinci", "psm"])
@@ -292,10 +297,10 @@ def test_bodies_are_completed_by_those_nearest_to_the_robot_s_guesses():
     arm = urdf.completed_arm(
         DAVINCI, exported_models.fit_of(model, "coupled", model.mechanism.matrix @ x, "consistent")
     )
-    assert_allclose(arm.inertial.ravel(), guess, rtol=0, atol=1e-7)
-    light = urdf.completed_arm(replace(DAVINCI, bodies=None), arm.fit)
-    assert light.inertial[:, 0].sum() < 0.9 * guess[::10].sum()
-    J = pseudo_inertias(light.inertial[light.inertial[:, 0] > 0.0])  # simulators refuse a body without any inertia
+    assert_allclose(inertial(arm).ravel(), guess, rtol=0, atol=1e-7)
+    light = inertial(urdf.completed_arm(replace(DAVINCI, bodies=None), arm.fit))
+    assert light[:, 0].sum() < 0.9 * guess[::10].sum()
+    J = pseudo_inertias(light[light[:, 0] > 0.0])  # simulators refuse a body without any inertia
     assert (np.linalg.eigvalsh(J / J[:, 3:, 3:])[:, 0] > 1e-13).all()
 
 

@@ -44,7 +44,7 @@ class Odd(Log):
         yield {"x": np.arange(3.0, 6.0)}
 
 
-def open_in_child(path, options):
+def open_in_child(path):
     if path.read_text() == "refuse":
         raise BadLog(f"{path}: refused")
     return Odd(path, "odd", (Channel("x", "m", alias="y"),), facts={"pid": str(os.getpid())})

@@ -209,13 +209,12 @@ def test_fields_of_a_record_of_ros_1_are_read_in_any_order():
 
 @pytest.mark.medium
 def test_blocks_of_a_long_bag_are_bounded_and_whole(tmp_path):
-    from davinci_forces.logs.log import Options
     from davinci_forces.logs.ros.bag import open_in_child
     from davinci_forces.logs.ros.scan import BATCH_MESSAGES
 
     count = 2 * BATCH_MESSAGES + 5
     messages = (joint_state(0.001 * i, ["roll"], [i]) for i in range(count))
-    log = open_in_child(write(Path(tmp_path) / "log", messages), Options())
+    log = open_in_child(write(Path(tmp_path) / "log", messages))
     blocks = [block["/PSM1/measured_js/position[0]"] for block in log.blocks(["/PSM1/measured_js/position[0]"])]
     assert max(map(len, blocks)) == BATCH_MESSAGES
     assert_array_equal(np.concatenate(blocks), np.arange(count))

@@ -19,7 +19,7 @@ from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.urdf import reading, tables, writing
 from davinci_forces.stages.tip import resolve
 from davinci_forces.study import LogEntry
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile
 
 POSES = 50
 LINK = """<link name="{name}"><inertial><origin xyz="{centre}" rpy="0.3 -0.2 0.5"/><mass value="{mass}"/>

@@ -19,8 +19,7 @@ from davinci_forces.simulation.motion import simulate_log
 from davinci_forces.simulation.scenario.reading import _scenario, load, shipped_scenarios
 from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.sensors import record_force
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 from tests.conftest import TWO_FRICTIONS
 from tests.test_study import ANYTHING, places_of
 

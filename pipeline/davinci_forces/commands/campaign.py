@@ -3,18 +3,18 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo
 
 
 def run(
     studies: Annotated[
-        list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")
+        list[Path] | None, Argument(help="Folders of studies; without any, all studies in raw/.")
     ] = None,
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for campaign.html and campaign.pdf, instead of the reports' folder.")
+        Path | None, Option(help="Folder for campaign.html and campaign.pdf, instead of the reports' folder.")
     ] = None,
 ) -> None:
     """Write campaign.html and campaign.pdf from the reports of studies, and name the studies that have none."""

@@ -10,34 +10,29 @@ import sys
 from collections import Counter
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.report.changes import RANKS, Change, StatedValue, by_joint, changes
 from davinci_forces.runner.console import echo, table
-
-if TYPE_CHECKING:
-    from davinci_forces.report.changes import Change, StatedValue
+from davinci_forces.runner.results import stated
 
 LARGEST = 10  # changes of a joint that are listed
 
 
 def run(
-    a: Annotated[Path, typer.Argument(help="A results.json, or a study, raw/<study>, that has one.")],
-    b: Annotated[Path, typer.Argument(help="The results.json or study to compare with it.")],
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="List every change, not the ten largest of each joint.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")
-    ] = False,
+    a: Annotated[Path, Argument(help="A results.json, or a study, raw/<study>, that has one.")],
+    b: Annotated[Path, Argument(help="The results.json or study to compare with it.")],
+    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    every: Annotated[bool, Option("--all", help="List every change, not the ten largest of each joint.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")] = False,
 ) -> None:
     """List what changed from A to B, joint by joint: page one first, models that were not chosen last.
 
     Within a rank, the largest changes in standard errors come first.
     """
-    from davinci_forces.report.changes import changes
     from davinci_forces.runner import runs
-    from davinci_forces.runner.results import stated
 
     files = runs.results_of(a, reports), runs.results_of(b, reports)
     before, after = (stated.read(file) for file in files)
@@ -54,7 +49,7 @@ def run(
     echo("\n".join(_lines(differing, before, after, sys.maxsize if every else LARGEST)))
 
 
-def _row(change: "Change") -> dict[str, Any]:
+def _row(change: Change) -> dict[str, Any]:
     """One change as JSON values: null for an absent number, text for NaN and infinity, which JSON does not have."""
     a, b = (_plain(number.value) if number else None for number in (change.before, change.after))
     return {"key": change.key, "a": a, "b": b, "std": _plain(change.std), "z": change.z}
@@ -65,12 +60,11 @@ def _plain(value: Any) -> Any:
 
 
 def _lines(
-    differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"], most: int
+    differing: list[Change], before: dict[str, StatedValue], after: dict[str, StatedValue], most: int
 ) -> list[str]:
     """The comparison as lines of text, with at most `most` changes of a joint."""
-    from davinci_forces.report.changes import RANKS, by_joint
 
-    def counts(some: list["Change"]) -> str:
+    def counts(some: list[Change]) -> str:
         number = Counter(change.subject for change in some)
         return ": " + ", ".join(f"{number[about]} of {about}" for about in RANKS if number[about]) if some else ""
 
@@ -96,14 +90,14 @@ def _lines(
     return lines
 
 
-def _cells(change: "Change") -> tuple[str, ...]:
+def _cells(change: Change) -> tuple[str, ...]:
     assert change.before
     assert change.after
     std, z = (None if x is None else format(x, spec) for x, spec in ((change.std, ".2g"), (change.z, "+.1f")))
     return (change.subject, change.key, *_pair(change.before, change.after), std or "", z or "")
 
 
-def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
+def _pair(a: StatedValue, b: StatedValue) -> tuple[str, str]:
     """Two values with their units, in at least 5 digits and as many as show the difference."""
     from davinci_forces.report.results import format_unit
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -18,47 +19,41 @@ if TYPE_CHECKING:
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
-    joint: Annotated[str, typer.Argument(help="A joint of the robot, or `all` to move all joints together.")],
-    evaluate: Annotated[str | None, typer.Option(help="Evaluate these coefficients: a0,a1,b1,a2,b2,...")] = None,
-    period: Annotated[
-        float | None, typer.Option(help="Period [s]; default 10, or 5 if all joints are prismatic.")
-    ] = None,
-    harmonics: Annotated[int | None, typer.Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
+    robot: Annotated[str, Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
+    joint: Annotated[str, Argument(help="A joint of the robot, or `all` to move all joints together.")],
+    evaluate: Annotated[str | None, Option(help="Evaluate these coefficients: a0,a1,b1,a2,b2,...")] = None,
+    period: Annotated[float | None, Option(help="Period [s]; default 10, or 5 if all joints are prismatic.")] = None,
+    harmonics: Annotated[int | None, Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
     criterion: Annotated[
         str,
-        typer.Option(
+        Option(
             help="What to minimise, of regressor F: `determinant` is -log10 det(F'F), `condition` is log10 cond(F)."
         ),
     ] = "determinant",
-    q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
-    dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
-    ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
+    q: Annotated[str | None, Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
+    dq: Annotated[str | None, Option(help="Velocity limits, in the same form.")] = None,
+    ddq: Annotated[str | None, Option(help="Acceleration limits, in the same form.")] = None,
     noise: Annotated[
         str | None,
-        typer.Option(help="Standard deviation of the effort noise, or one for each joint; prints the expected errors."),
+        Option(help="Standard deviation of the effort noise, or one for each joint; prints the expected errors."),
     ] = None,
     floor: Annotated[
-        float | None, typer.Option(help="With JOINT `all`: no moving frame goes below this z [m], in base axes.")
+        float | None, Option(help="With JOINT `all`: no moving frame goes below this z [m], in base axes.")
     ] = None,
     box: Annotated[
         list[str] | None,
-        typer.Option(
-            help="With JOINT `all`: a box that no frame may enter, by two corners x,y,z,x,y,z [m]. Repeatable."
-        ),
+        Option(help="With JOINT `all`: a box that no frame may enter, by two corners x,y,z,x,y,z [m]. Repeatable."),
     ] = None,
     starts: Annotated[
-        int | None, typer.Option(min=1, help="Starting points of the search; default 24, or 2 if JOINT is `all`.")
+        int | None, Option(min=1, help="Starting points of the search; default 24, or 2 if JOINT is `all`.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starting points.")] = 0,
-    samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
-    rate: Annotated[float, typer.Option(help="Sampling rate [Hz] of the table of --csv.")] = 100.0,
-    csv: Annotated[Path | None, typer.Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,
-    run_in: Annotated[
-        bool, typer.Option(help="Begin the table of --csv with a run-in from rest, before t = 0.")
-    ] = True,
-    plot: Annotated[Path | None, typer.Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    seed: Annotated[int, Option(min=0, help="Seed of the random starting points.")] = 0,
+    samples: Annotated[int, Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
+    rate: Annotated[float, Option(help="Sampling rate [Hz] of the table of --csv.")] = 100.0,
+    csv: Annotated[Path | None, Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,
+    run_in: Annotated[bool, Option(help="Begin the table of --csv with a run-in from rest, before t = 0.")] = True,
+    plot: Annotated[Path | None, Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Minimise the criterion over Fourier series that keep the limits at every instant.
 
@@ -67,7 +62,6 @@ def run(
     The trajectory is not checked for collisions. Where the best, the median and the worst start differ, more starts may
     find a better trajectory. A line is printed after each start, as the search may take minutes.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 

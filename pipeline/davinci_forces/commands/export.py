@@ -7,32 +7,32 @@ connects to a robot.
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.exports import FORMATS
+from davinci_forces.files import write_folder
 from davinci_forces.runner.console import echo
 
 
 def run(
-    study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
-    to: Annotated[str, typer.Option("--to", metavar="FORMAT", help=f"Format: {', '.join(FORMATS)}.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
+    study: Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
+    to: Annotated[str, Option("--to", metavar="FORMAT", help=f"Format: {', '.join(FORMATS)}.")],
+    out: Annotated[Path | None, Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
     joint: Annotated[
-        list[str] | None, typer.Option(help="Export this joint only; may be repeated. Default: all with a model.")
+        list[str] | None, Option(help="Export this joint only; may be repeated. Default: all with a model.")
     ] = None,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace the folder of an earlier export.")] = False,
+    replace: Annotated[bool, Option("--replace", help="Replace the folder of an earlier export.")] = False,
     despite_verdict: Annotated[
-        bool, typer.Option("--despite-verdict", help="Export a joint with the verdict Problem, or a rejected study.")
+        bool, Option("--despite-verdict", help="Export a joint with the verdict Problem, or a rejected study.")
     ] = False,
     processed: Annotated[
-        Path | None, typer.Option(help="Folder for processed files, instead of processed/ next to raw/.")
+        Path | None, Option(help="Folder for processed files, instead of processed/ next to raw/.")
     ] = None,
-    reports: Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ next to raw/.")] = None,
+    reports: Annotated[Path | None, Option(help="Folder for reports, instead of reports/ next to raw/.")] = None,
 ) -> None:
     """Run all stages that are not up to date, and write a folder of files, whole or not at all."""
-    from davinci_forces.errors import BadRequest
     from davinci_forces.exports import renderer
-    from davinci_forces.files import write_folder
     from davinci_forces.runner import ALL, runs
     from davinci_forces.runner.results.exported import permitted_export
 

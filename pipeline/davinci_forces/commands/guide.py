@@ -3,26 +3,22 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo, show_markdown
 
 DEFAULT_FILE = Path("davinci-forces-guide.html")
 
 
 def run(
-    topic: Annotated[
-        list[str] | None, typer.Argument(help="Topic or term to show; without one, the list of topics.")
-    ] = None,
-    html: Annotated[
-        bool, typer.Option("--html", help="Write the whole guide as one HTML file, for offline use.")
-    ] = False,
-    out: Annotated[Path | None, typer.Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
+    topic: Annotated[list[str] | None, Argument(help="Topic or term to show; without one, the list of topics.")] = None,
+    html: Annotated[bool, Option("--html", help="Write the whole guide as one HTML file, for offline use.")] = False,
+    out: Annotated[Path | None, Option(help=f"File that --html writes, instead of {DEFAULT_FILE}.")] = None,
 ) -> None:
     """Show a topic or the list of topics in the terminal, or write the HTML file and say where it is."""
     from davinci_forces import guide
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
 
     page = guide.page(" ".join(topic)) if topic else None
     if not html:

@@ -3,29 +3,31 @@
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
     from davinci_forces.haptics.scenario import HapticScenario
     from davinci_forces.records import HapticRun
 
-Answer = dict[str, object]
+Answer = dict[str, Any]
 
 
 def run(
     scenario: Annotated[
-        Path | None, typer.Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
+        Path | None, Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
     csv: Annotated[
-        Path | None, typer.Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
+        Path | None, Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
     ] = None,
     template: Annotated[
-        Path | None, typer.Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")
+        Path | None, Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")
     ] = None,
 ) -> None:
     """Simulate the whole loop: hand, device, link, arm with its controller, friction and filter, and tissue."""
@@ -42,9 +44,6 @@ def run(
 def _write_template(file: Path) -> None:
     """Write the shipped scenario to a new file; raises BadRequest if the file exists."""
     from importlib.resources import files
-
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
 
     if file.exists():
         raise BadRequest(f"{file} exists already; name another file, or move it away")
@@ -76,7 +75,6 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
 
 def _write_csv(file: Path, run: "HapticRun") -> None:
     """Write the motion and force of one hand, one row per step of the controller."""
-    from davinci_forces.files import write_bytes
 
     columns = run.t, run.plan_x, run.hand_x, run.arm_x, run.true_force, run.felt_force
     rows = zip(*(column.tolist() for column in columns), strict=True)
@@ -89,9 +87,9 @@ def _format_text(answer: Answer) -> str:
     """The results as text, one paragraph per hand."""
     lines = [f"{answer['title']}, simulated, against tissue of {answer['tissue_stiffness']:.4g} N/m.", ""]
     lines += ["Frequency, felt stiffness in % of the true one, and delay of the felt force:"]
-    lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"
-              for row in answer["response"]]  # type: ignore[attr-defined]  # fmt: skip
-    for name, hand in answer["hands"].items():  # type: ignore[attr-defined]
+    for row in answer["response"]:
+        lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"]
+    for name, hand in answer["hands"].items():
         lines += [
             "",
             f"Hand {name!r} of m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m:",

@@ -7,8 +7,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.files import visible
 from davinci_forces.runner.console import echo, table
 
 if TYPE_CHECKING:
@@ -21,12 +22,12 @@ MAX_REPEATED_OR_JITTER = 0.1  # share of rows, and of the sampling time, above w
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="A log; `davinci-forces guide formats` lists the formats.")],
-    head: Annotated[int, typer.Option(min=0, help="Number of rows to show.")] = 5,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the description as JSON.")] = False,
-    dtype: Annotated[str | None, typer.Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,
+    file: Annotated[Path, Argument(help="A log; `davinci-forces guide formats` lists the formats.")],
+    head: Annotated[int, Option(min=0, help="Number of rows to show.")] = 5,
+    as_json: Annotated[bool, Option("--json", help="Print the description as JSON.")] = False,
+    dtype: Annotated[str | None, Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,
     columns: Annotated[
-        str | None, typer.Option(help="Columns of raw binary numbers: how many, or names, as in t,q,i.")
+        str | None, Option(help="Columns of raw binary numbers: how many, or names, as in t,q,i.")
     ] = None,
 ) -> None:
     """Print the description of a log, as text or JSON."""
@@ -37,8 +38,6 @@ def run(
     if as_json:
         echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        from davinci_forces.files import visible
-
         echo("\n".join(visible(line) for line in lines(description)))
 
 
@@ -52,19 +51,15 @@ class _Survey:
     rows: int = 0
 
 
-def describe(file: Path, head: int, options: "Options | None" = None) -> dict[str, Any]:
+def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
     """Read a whole log, clock by clock, and describe it as JSON values, without NaN.
 
-    Raises
-    ------
-    BadLog
-        If it cannot be read.
+    Raises BadLog if it cannot be read.
     """
     from davinci_forces.logs import open_log
-    from davinci_forces.logs.log import Options
     from davinci_forces.study.timing import named_time
 
-    log = open_log(file, options or Options())
+    log = open_log(file, options)
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
     source, warnings = named_time(log), list[str]()
     surveys: dict[str, _Survey] = {}
@@ -85,7 +80,7 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
         "clocks": [_clock(log, clock, s.statistics) | {"channels": [*s.first]} for clock, s in surveys.items()],
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
-        "warnings": [*warnings, *_flags(log, source, main.statistics)],
+        "warnings": [*warnings, *_flags(source, main.statistics)],
         "head": {name: [_plain(value) for value in first[name]] for name in names},
     }  # fmt: skip
 
@@ -142,7 +137,7 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
     return labels | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
 
 
-def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
+def _flags(source: str, clock: "ClockStatistics") -> Iterator[str]:
     """Warnings about a clock: repeated rows, times that do not increase, jitter and gaps."""
     if clock.duplicates > MAX_REPEATED_OR_JITTER * clock.samples:
         share = clock.duplicates / clock.samples

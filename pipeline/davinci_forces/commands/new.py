@@ -3,23 +3,23 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
+from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo, table
 
 
 def run(
-    files: Annotated[list[Path], typer.Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
+    files: Annotated[list[Path], Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
     robot: Annotated[
         str,
-        typer.Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
+        Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
     ] = "",
-    study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of the first log's.")] = None,
-    show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,
+    study: Annotated[Path | None, Option(help="Folder of the study, instead of the first log's.")] = None,
+    show: Annotated[bool, Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml, and print what to check; an existing file is never overwritten."""
-    from davinci_forces.errors import BadRequest
-    from davinci_forces.files import write_bytes
     from davinci_forces.study import template
 
     folder = study or (files[0] if template.is_folder(files[0]) else files[0].parent)
@@ -30,9 +30,9 @@ def run(
     target = folder / "study.toml"
     if target.exists():
         raise BadRequest(f"{target} exists already; move it away, or print the new one with --print")
-    if draft.robot_file:
-        write_bytes(folder / draft.robot_file, draft.robot_text.encode())
-        echo(f"{folder / draft.robot_file}: {draft.robot_reason}; check the kinds of its joints and their terms")
+    if draft.arm.text:
+        write_bytes(folder / draft.arm.name, draft.arm.text.encode())
+        echo(f"{folder / draft.arm.name}: {draft.arm.reason}; check the kinds of its joints and their terms")
     write_bytes(target, draft.text.encode())
     echo("\n".join(table([("file", "role", "rate", "joints", "look at"), *draft.rows])))
     if all(row.role in ("left out", "-") for row in draft.rows):

@@ -5,8 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -17,20 +18,18 @@ MAX_DEFAULT_COORDINATES = 6  # of the zero pose of an arm with a wrist: the arm 
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
+    robot: Annotated[str, Argument(help="davinci, dvrk_psm, or the path of a robot's .toml or .urdf file.")],
     at: Annotated[
-        str | None, typer.Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
+        str | None, Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
     ] = None,
     dq: Annotated[
-        str | None, typer.Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
+        str | None, Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-    urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    urdf: Annotated[bool, Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
     thesis: Annotated[
         bool,
-        typer.Option(
-            "--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."
-        ),
+        Option("--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."),
     ] = False,
 ) -> None:
     """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.
@@ -56,7 +55,6 @@ def run(
 
 def _index(robot: "Robot") -> str:
     """The thesis chapter by chapter, with the results of `davinci-thesis` in `reports/` if it has run."""
-    from davinci_forces.errors import BadRequest, MissingRecord
     from davinci_forces.runner.results.dataframes import results
     from davinci_forces.simulation import thesis
 
@@ -71,7 +69,6 @@ def _index(robot: "Robot") -> str:
 
 def _values(option: str, text: str) -> list[float]:
     """Read numbers separated by commas."""
-    from davinci_forces.errors import BadRequest
     from davinci_forces.toml import unlikely
 
     values = []
@@ -90,14 +87,10 @@ def _values(option: str, text: str) -> list[float]:
 def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
     """The printed quantities as JSON values.
 
-    Raises
-    ------
-    BadRequest
-        If the robot has no chain, or the length of q or dq is wrong.
+    Raises BadRequest if the robot has no chain, or the length of q or dq is wrong.
     """
     import numpy as np
 
-    from davinci_forces.errors import BadRequest
     from davinci_forces.maths.mechanics import kinematics, tip_force
 
     chain = robot.chain

@@ -3,21 +3,21 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")],
-    out: Annotated[Path, typer.Argument(help="Folder of the new study.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing simulated study.")] = False,
+    scenario: Annotated[str, Argument(help="Name of a shipped scenario, or path of a .toml file.")],
+    out: Annotated[Path, Argument(help="Folder of the new study.")],
+    force: Annotated[bool, Option("--force", help="Replace an existing simulated study.")] = False,
 ) -> None:
     """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml.
 
     If OUT holds the study.toml of this scenario, logs and truth.toml are written beside it, and no other file changes.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.simulation import study_folder
     from davinci_forces.simulation.scenario.reading import load
 

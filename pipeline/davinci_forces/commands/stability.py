@@ -7,8 +7,9 @@ of the thesis.
 import json
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -19,14 +20,14 @@ TRIED_DELAYS = 101
 
 
 def run(
-    k_h: Annotated[float, typer.Option(help="Stiffness K_H of the hand [N/m]; the thesis states none.")] = 100.0,
-    b_h: Annotated[float, typer.Option(help="Damping b_H of the hand [N s/m].")] = 1.0,
-    m: Annotated[float, typer.Option(help="Mass m of the hand and what it holds [kg].")] = 1.0,
+    k_h: Annotated[float, Option(help="Stiffness K_H of the hand [N/m]; the thesis states none.")] = 100.0,
+    b_h: Annotated[float, Option(help="Damping b_H of the hand [N s/m].")] = 1.0,
+    m: Annotated[float, Option(help="Mass m of the hand and what it holds [kg].")] = 1.0,
     delay: Annotated[
-        float | None, typer.Option(help="Delay [s] of the force on the hand, due to filter and data link.")
+        float | None, Option(help="Delay [s] of the force on the hand, due to filter and data link.")
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Rate [Hz] at which the hand receives a new force.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    rate: Annotated[float | None, Option(help="Rate [Hz] at which the hand receives a new force.")] = None,
+    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Print the largest stable tissue stiffness K_T [N/m]: by (8.10), by arbitrary switching, by delay and sampling."""
     hand = _hand(k_h, b_h, m, delay, rate)
@@ -41,12 +42,8 @@ def run(
 def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | None) -> "Hand":
     """The hand with these parameters, in SI units.
 
-    Raises
-    ------
-    BadRequest
-        If a parameter is impossible; all such parameters are named.
+    Raises BadRequest if a parameter is impossible; all such parameters are named.
     """
-    from davinci_forces.errors import BadRequest
     from davinci_forces.haptics.maths.bimodal import Hand
     from davinci_forces.toml import unlikely
 

@@ -3,24 +3,24 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from davinci_forces.runner.console import echo
 
 
 def run(
-    study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
+    study: Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
     processed: Annotated[
-        Path | None, typer.Option(help="Folder of processed files, instead of processed/ next to raw/.")
+        Path | None, Option(help="Folder of processed files, instead of processed/ next to raw/.")
     ] = None,
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     report_id: Annotated[
-        str, typer.Option("--id", help="Check that the study has this report ID, as printed in its report.")
+        str, Option("--id", help="Check that the study has this report ID, as printed in its report.")
     ] = "",
     again: Annotated[
-        bool, typer.Option("--again", help="Recompute everything from raw/ in a temporary folder, and compare.")
+        bool, Option("--again", help="Recompute everything from raw/ in a temporary folder, and compare.")
     ] = False,
-    jobs: Annotated[int, typer.Option(min=1, help="Number of processes to recompute in.")] = 1,
+    jobs: Annotated[int, Option(min=1, help="Number of processes to recompute in.")] = 1,
 ) -> None:
     """Verify a study; every difference is an error, with exit code 1."""
     from davinci_forces.runner import recomputation, runs, verification

@@ -18,13 +18,7 @@ NO_LINK = {"name": "", "parent": None, "coordinate": None, "prismatic": False, "
 
 
 def render(export: Export) -> Rendering:
-    """Render model.h and model.c.
-
-    Raises
-    ------
-    BadRequest
-        If a joint has no filter.
-    """
+    """Render model.h and model.c; raises BadRequest if a joint has no filter."""
     document = export.document()
     if missing := [joint["name"] for joint in document["joints"] if not joint["filter"]]:
         raise BadRequest(f"{export.study.name}: no identification log gives the noise of the filter of {missing[0]}")

@@ -194,12 +194,7 @@ def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
 def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: Sequence[str] = ()) -> Export:
     """Collect the models of these joints of a study; without names, of every joint with a model.
 
-    Raises
-    ------
-    BadRequest
-        If no model was chosen, or a joint has none.
-    BadRobot
-        If there is no such joint.
+    Raises BadRequest if no model was chosen, or a joint has none; BadRobot if there is no such joint.
     """
     identified = Identified(study.robot, [*catalogue.records(Fit), *catalogue.records(Choice)])
     if study.settings.fit == CHOSEN and not catalogue.records(Choice):

@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from davinci_forces.exports.identified import Export, Rendering
 from davinci_forces.files import read_bytes, text_of
@@ -17,8 +16,5 @@ def render(export: Export) -> Rendering:
         "model.json": {"$schema": SCHEMA, **export.document()},
         SCHEMA: {**schema, "$comment": "; ".join(export.head())},
     }
-    return Rendering({name: _text(content) for name, content in files.items()}, export.remarks())
-
-
-def _text(content: dict[str, Any]) -> str:
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    texts = {name: json.dumps(x, indent=1, ensure_ascii=False, allow_nan=False) + "\n" for name, x in files.items()}
+    return Rendering(texts, export.remarks())

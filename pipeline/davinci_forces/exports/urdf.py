@@ -42,7 +42,6 @@ class IdentifiedArm(NamedTuple):
     robot: Robot
     fit: Fit
     model: CoupledArm
-    inertial: Array  # (L, 10) parameters of the links
     friction: dict[str, tuple[float, float]]  # viscous and Coulomb, by joint
     remainder: dict[ModelTerm, float]  # what URDF cannot hold
 
@@ -50,10 +49,7 @@ class IdentifiedArm(NamedTuple):
 def render(export: Export) -> Rendering:
     """Render the URDF and the table beside it.
 
-    Raises
-    ------
-    BadRequest
-        If the robot has no chain, an effort is a current, or no log moves the joints together.
+    Raises BadRequest if the robot has no chain, an effort is a current, or no log moves the joints together.
     """
     robot, currents = export.study.robot, [joint.name for joint in export.joints if joint.joint.effort]
     missing = [f"effort in N m or N: that of {', '.join(currents)} is in A; state torque_constant"] * bool(currents)
@@ -80,10 +76,7 @@ def render(export: Export) -> Rendering:
 def consistent_fits(export: Export) -> list[Fit]:
     """The consistent fits of all moving joints as one arm: those in the records, or a new one from the same logs.
 
-    Raises
-    ------
-    BadRequest
-        If the export lacks a joint, or no identification log holds all joints and moves several of them.
+    Raises BadRequest if the export lacks a joint, or no identification log holds all joints and moves several of them.
     """
     from davinci_forces.identification.candidates import candidates, reach_of
     from davinci_forces.identification.chosen import select_candidate
@@ -123,7 +116,7 @@ def completed_arm(robot: Robot, fit: Fit) -> IdentifiedArm:
     drives = [ModelTerm(name, term) for term in DRIVE for name in model.efforts]
     values = dict(zip([*drives, *terms_of(model)[base:]], x[L:].tolist(), strict=True))
     friction = {j: (values.pop(ModelTerm(j, viscous)), values.pop(ModelTerm(j, coulomb))) for j in model.efforts}
-    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, inertial, friction, values)
+    return IdentifiedArm(replace(robot, bodies=as_bodies(inertial)), fit, model, friction, values)
 
 
 def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: ArmMotion) -> Array:

@@ -17,10 +17,7 @@ BAG = ("metadata.yaml", "*.db3", "*.mcap")  # files in a folder that is a log: a
 def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - frozen
     """Open a log with the first format that recognises it.
 
-    Raises
-    ------
-    BadLog
-        If the file is not there, is empty, or no format recognises it.
+    Raises BadLog if the file is not there, is empty, or no format recognises it.
     """
     if not path.exists():
         raise BadLog(f"{path}: there is no such file")

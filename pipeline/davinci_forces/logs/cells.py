@@ -83,11 +83,7 @@ def parse(
     """Convert the `wanted` columns of rows of `width` cells to numbers; column `text` is not converted.
 
     `times` converts those wanted columns that are not written as numbers.  Empty cells and the words `missing` are NaN.
-
-    Raises
-    ------
-    UNREADABLE
-        If a row has another width, or a wanted cell is not a number.
+    Raises UNREADABLE if a row has another width, or a wanted cell is not a number.
     """
     types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
     types |= {f"{i}": pa.string() for i in wanted if i in times}

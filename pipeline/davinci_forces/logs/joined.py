@@ -9,6 +9,7 @@ that noise above the clock's Nyquist frequency is not aliased.  Clocks whose sta
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -60,10 +61,8 @@ class Joined(Log):
         self.parts = dict(zip(unique([Path(name.removesuffix(".gz")).stem for name in names]), parts, strict=True))
         self.lent = {f"{stem}/{n}": f"{stem}/{c}" for stem, part in self.parts.items() for n, c in part.lent.items()}
         starts = starts_of(parts)
-        self.offsets = dict.fromkeys(self.parts, 0.0)
-        if starts:
-            since = ((start - starts[0]).total_seconds() for start in starts)
-            self.offsets = dict(zip(self.parts, since, strict=True))
+        since = [(start - starts[0]).total_seconds() for start in starts] or [0.0] * len(parts)
+        self.offsets = dict(zip(self.parts, since, strict=True))
         self.remarks = [] if starts else [
             "not all joined files say when they started; their clocks are assumed to have the same zero"
         ]  # fmt: skip
@@ -91,10 +90,9 @@ class Joined(Log):
             return super().times_called(name)
         return [self.find(f"{stem}/{part.find(name).name}") for stem, part in self.parts.items()]
 
-    def independent_copy(self) -> "Joined":
+    def independent_copy(self) -> Self:
         """Copy the log and its files, to be read at the same time as this one."""
         twin = super().independent_copy()
-        assert isinstance(twin, Joined)
         twin.parts = {stem: part.independent_copy() for stem, part in self.parts.items()}
         return twin
 
@@ -157,12 +155,8 @@ def align(
 ) -> Iterator[TimedBlock]:
     """Align channels of other clocks to the rows of one clock; `done` records how.
 
-    Rows that are not between samples of every other clock are left out.
-
-    Raises
-    ------
-    BadLog
-        If times do not increase, clocks do not overlap, or one is far slower.
+    Rows that are not between samples of every other clock are left out.  Raises BadLog if times do not increase, clocks
+    do not overlap, or one is far slower.
     """
     clock = _Rising("the positions", refuse)
     for t, block in timed:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,12 +100,8 @@ class Log:
         """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
 
         Channels on several clocks are read one clock after the other, see `by_clock`.  Missing cells and cells that
-        hold NaN are both NaN in the block; `nulls` and `nans` count them separately.
-
-        Raises
-        ------
-        BadLog
-            If damage makes the rest of the file unreadable; names the file, line and column.
+        hold NaN are both NaN in the block; `nulls` and `nans` count them separately.  Raises BadLog with the file, line
+        and column if damage makes the rest of the file unreadable.
         """
         self._restart(names)
         yield from self._read(names)
@@ -116,13 +113,13 @@ class Log:
     def find(self, name: str | int) -> Channel:
         """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
 
-        Raises
-        ------
-        BadLog
-            If there is none, or more than one; the message lists the closest.
+        Raises BadLog if there is none, or more than one; the message lists the closest.
         """
         if isinstance(name, int):
-            return self._numbered(name)
+            written = [channel for channel in self.channels if not channel.derived]
+            if not 0 <= name < len(written):
+                raise BadLog(f"{self.path}: there is no column {name}; its {len(written)} columns are counted from 0")
+            return written[name]
         exact = [channel for channel in self.channels if channel.name == name]
         exact = exact or [channel for channel in self.channels if channel.alias == name]
         last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
@@ -139,10 +136,7 @@ class Log:
     def times_called(self, name: str | int) -> list[Channel]:
         """List the time channels that a study means by a name: one, or one of that name in each group of channels.
 
-        Raises
-        ------
-        BadLog
-            If there is none.
+        Raises BadLog if there is none.
         """
         if isinstance(name, int):
             return [self.find(name)]
@@ -152,7 +146,7 @@ class Log:
         others = [c for c in alike if c not in exact] if not exact or "/" in name else []
         return [*exact, *others] or [self.find(name)]
 
-    def independent_copy(self) -> "Log":
+    def independent_copy(self) -> Self:
         """Copy the log, to be read at the same time as this one, with separate counts and warnings."""
         twin = copy(self)
         twin.warnings, twin.comments, twin.facts = [*self.warnings], [*self.comments], {**self.facts}
@@ -177,12 +171,6 @@ class Log:
             by_name = {channel.name: channel for channel in self.channels}
             self._indexed = self.channels, by_name, {channel.time for channel in self.channels}
         return self._indexed[1:]
-
-    def _numbered(self, number: int) -> Channel:
-        written = [channel for channel in self.channels if not channel.derived]
-        if not 0 <= number < len(written):
-            raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
-        return written[number]
 
     def _restart(self, names: Sequence[str]) -> None:
         """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""

@@ -18,7 +18,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 
 NPY = b"\x93NUMPY"
@@ -31,7 +31,7 @@ def recognises(path: Path, head: bytes) -> bool:
     return head.startswith(NPY) or (head.startswith(b"PK") and b".npy" in head[30:542])
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the file; raises BadLog if it holds no array of samples, or more than `MAX_MEMBERS`."""
     log = ArrayLog(path, "npz", ())
     with open_file(path) as file:

@@ -6,6 +6,7 @@ from datetime import datetime
 from filecmp import cmp
 from itertools import pairwise
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -23,10 +24,8 @@ ABSOLUTE = 1e9  # [s] a larger time counts from a fixed year, not from the start
 def open_parts(files: Sequence[Path], options: Options) -> Log:
     """Open the files of a log, in order.
 
-    Raises
-    ------
-    BadLog
-        If one cannot be read, has other channels than the first, is a copy, or started before its predecessor.
+    Raises BadLog if one cannot be read, has other channels than the first, is a copy, or started before its
+    predecessor.
     """
     require_different(files)
     opened = [open_log(file, options) for file in files]
@@ -100,10 +99,9 @@ class Parts(Log):
         new = (Channel(t, "s", "time", True, "" if t == main else t) for t in self.times if t not in names)
         self.channels = (*timed, *new)
 
-    def independent_copy(self) -> "Parts":
+    def independent_copy(self) -> Self:
         """Copy the log and its parts, to be read at the same time as this one."""
         twin = super().independent_copy()
-        assert isinstance(twin, Parts)
         twin.parts = [part.independent_copy() for part in self.parts]
         return twin
 

@@ -14,7 +14,7 @@ import numpy as np
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import isolated
 from davinci_forces.logs.arrays import MAX_COLUMNS
-from davinci_forces.logs.log import Block, Channel, Log, Options, unique, unit_in
+from davinci_forces.logs.log import Block, Channel, Log, unique, unit_in
 
 FIRST_MEMBERS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 BLOCK_ROWS_SHEET = 1 << 12
@@ -31,7 +31,7 @@ def recognises(path: Path, head: bytes) -> bool:
     return head.startswith(b"PK") and (is_named or head[30:].startswith(FIRST_MEMBERS))
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the longest sheet of a workbook; raises BadLog if none has columns of numbers below their names."""
     with zipfile.ZipFile(path) as archive:
         size = sum(info.file_size for info in archive.infolist())

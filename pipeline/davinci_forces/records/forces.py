@@ -1,14 +1,12 @@
 """Records of the external effort on joints: the filter's noise, its estimates, and their errors."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Names, Published
 
 SMOOTHER = "rts"  # the filter whose external effort is the result; the default filter is what real time would see
 
 
-@dataclass(frozen=True, eq=False)
 class Tuning(LogJointRecord):
     """The noise of one joint in one identification log that maximises the likelihood of the filter's innovations."""
 
@@ -23,7 +21,6 @@ class Tuning(LogJointRecord):
     tested: int
 
 
-@dataclass(frozen=True, eq=False)
 class FilterNoise(JointRecord):
     """The noise that the filter assumes of a joint: the median of its identification logs.
 
@@ -45,7 +42,6 @@ class FilterNoise(JointRecord):
     trial_std: Column
 
 
-@dataclass(frozen=True, eq=False)
 class FreeMotion(LogJointRecord):
     """The smoother's external effort on one joint of a log of free motion, with a fit that did not use that log.
 
@@ -62,7 +58,6 @@ class FreeMotion(LogJointRecord):
     uncorrelated: Column
 
 
-@dataclass(frozen=True, eq=False)
 class ErrorBand(JointRecord):
     """The errors of a joint's smoothed external effort in free motion outside the fit, of at most 20 logs.
 
@@ -82,7 +77,6 @@ class ErrorBand(JointRecord):
     uncorrelated: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Track(LogJointRecord):
     """The external effort on one joint during one log, by filter and smoother, each with its standard deviation.
 
@@ -141,7 +135,6 @@ class Track(LogJointRecord):
     unscored: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class FreeSpace(LogJointRecord):
     """The external effort of smoother or filter on one joint of one log, where nothing touched the robot.
 
@@ -180,7 +173,6 @@ class FreeSpace(LogJointRecord):
             yield from self.publish(f"{self.prefix}.coverage_q{{row}}", "=quartile_coverage±")
 
 
-@dataclass(frozen=True, eq=False)
 class Threshold(JointRecord):
     """The detection level for contacts on a joint: the level of the log with the largest effort in free space.
 
@@ -202,7 +194,6 @@ class Threshold(JointRecord):
     band_width: float
 
 
-@dataclass(frozen=True, eq=False)
 class Contact(LogJointRecord):
     """The contacts of one joint in one log: its effort on the environment, and its detection level.
 
@@ -233,7 +224,6 @@ class Contact(LogJointRecord):
     above: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Streamed(LogJointRecord):
     """One joint of one log filtered as samples arrive, beside the smoother; a row is a contact."""
 
@@ -256,7 +246,6 @@ class Streamed(LogJointRecord):
     peak: Column
 
 
-@dataclass(frozen=True, eq=False)
 class StreamLevel(JointRecord):
     """The alarm level of one joint as samples arrive, over all its logs, and the contacts that exceed it."""
 
@@ -270,7 +259,6 @@ class StreamLevel(JointRecord):
     contacts_found: int
 
 
-@dataclass(frozen=True, eq=False)
 class Comparison(LogJointRecord):
     """One filter on one joint of a log: its effort in free space, and its response to a push added in software.
 

@@ -1,7 +1,6 @@
 """Records of the models of joints: their parameters, the choice among them, and friction over velocity."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import (
     Column,
@@ -16,7 +15,6 @@ from davinci_forces.records.record import (
 )
 
 
-@dataclass(frozen=True, eq=False)
 class Fit(Record):
     """The parameters of a model, estimated by one estimator from all identification logs."""
 
@@ -55,7 +53,6 @@ class Fit(Record):
     theta_std_classical: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Guess(Record):
     """An initial guess of a joint's parameters, without measurements, and the error that it leaves."""
 
@@ -71,7 +68,6 @@ class Guess(Record):
     theta: Column
 
 
-@dataclass(frozen=True, eq=False)
 class CrossFit(Record):
     """The parameters of a model from fits that leave out some identification logs, each log once."""
 
@@ -86,7 +82,6 @@ class CrossFit(Record):
     theta: Column
 
 
-@dataclass(frozen=True, eq=False)
 class SwarmSearch(Record):
     """A particle swarm search for the parameters of a model, with the lowest error after each iteration."""
 
@@ -108,7 +103,6 @@ class SwarmSearch(Record):
     best_mse: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Identifiability(Record):
     """The identifiability of a model's parameters: the correlation of each pair, and advice as text."""
 
@@ -133,7 +127,6 @@ class Identifiability(Record):
                 yield Published(f"correlation.{'.'.join(self.key)}.{slug(a)}.{slug(b)}", "correlation", row=i)
 
 
-@dataclass(frozen=True, eq=False)
 class FittedPaths(JointRecord):
     """The fitted paths of a joint, one period per path, one after the other; of many paths, those that differ most."""
 
@@ -143,7 +136,6 @@ class FittedPaths(JointRecord):
     q: Column
 
 
-@dataclass(frozen=True, eq=False)
 class MeasurementNoise(JointRecord):
     """The noise of a joint between periods: the root mean square over its identification logs."""
 
@@ -152,7 +144,6 @@ class MeasurementNoise(JointRecord):
     sigma_tau: float
 
 
-@dataclass(frozen=True, eq=False)
 class Residual(LogJointRecord):
     """The averaged effort of one identification log, and the effort of a fit for it."""
 
@@ -167,7 +158,6 @@ class Residual(LogJointRecord):
     tau_hat: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Choice(Record):
     """The model of a joint, or of the arm, that cross-validation chose from candidates."""
 
@@ -196,7 +186,6 @@ class Choice(Record):
     over_periods_std: Column
 
 
-@dataclass(frozen=True, eq=False)
 class ModelSearch(JointRecord):
     """The steps of the search for the model of a joint in a structure; processing and terms are of the chosen step."""
 
@@ -228,7 +217,6 @@ class ModelSearch(JointRecord):
             yield Published(f"choice.{self.joint}.term.{slug(term)}", "term_scale", row=i)
 
 
-@dataclass(frozen=True, eq=False)
 class FrictionMap(LogJointRecord):
     """The effort of one joint in one log minus a fit's terms except friction, and the fit's friction, over velocity.
 

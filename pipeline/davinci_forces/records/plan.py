@@ -1,12 +1,10 @@
 """Records of a robot that need no logs: its chain, its controllers, and its excitation."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, JointRecord, Labels, Published, Record, RobotRecord
 
 
-@dataclass(frozen=True, eq=False)
 class Links(RobotRecord):
     """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
 
@@ -25,7 +23,6 @@ class Links(RobotRecord):
     mass: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Pose(RobotRecord):
     """The positions of the frames of a robot's chain in one configuration."""
 
@@ -39,7 +36,6 @@ class Pose(RobotRecord):
     z: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Workspace(RobotRecord):
     """Reachable positions of the tip within the limits, with the condition number of its Jacobian."""
 
@@ -49,7 +45,6 @@ class Workspace(RobotRecord):
     condition: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Control(Record):
     """The motion of one joint in a simulated control study of chapter 5."""
 
@@ -70,7 +65,6 @@ class Control(Record):
     dq: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Lyapunov(Record):
     """The Lyapunov function over time in a simulated control study.  (5.9)"""
 
@@ -84,7 +78,6 @@ class Lyapunov(Record):
     V: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Excitation(JointRecord):
     """One period of an excitation trajectory, of the thesis or designed, its criteria and its excess over limits."""
 

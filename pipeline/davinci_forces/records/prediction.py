@@ -1,7 +1,6 @@
 """Records of a fit along a log: the predicted effort, and the joint model for filters."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, LogJointRecord, Published
 
@@ -10,7 +9,6 @@ CHOSEN_BY_LOG = "chosen_by_log"  # the chosen model, refitted without whole logs
 SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 
 
-@dataclass(frozen=True, eq=False)
 class Prediction(LogJointRecord):
     """The effort of a log that was left out of a fit, and the effort that the fit predicts for that log.
 
@@ -61,7 +59,6 @@ class Prediction(LogJointRecord):
         return self.publish(self.prefix, f"{scores} {errors}")
 
 
-@dataclass(frozen=True, eq=False)
 class PathShare(LogJointRecord):
     """The share of a joint's path that no other identification log follows, and the share of time in motion."""
 
@@ -72,7 +69,6 @@ class PathShare(LogJointRecord):
     moving: float
 
 
-@dataclass(frozen=True, eq=False)
 class JointModel(LogJointRecord):
     """The model of one joint along one log, with the fit that the setting `fit` selects:
 

@@ -13,7 +13,7 @@ prefix itself.  With `{row}` (its number from 1), `{name}` or `{slug}` in the pr
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -47,14 +47,18 @@ class Published(NamedTuple):
     row: int | None = None
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 class Record:
-    """The abstract base of all records."""
+    """The abstract base of all records; each is a frozen dataclass, compared by identity."""
 
     KEY: ClassVar[Names]
     UNKNOWN: ClassVar[Names] = ()  # columns in which NaN means unknown
     ROWS: ClassVar[str] = ""  # the column of row names, where rows have names
     PUBLISHED: ClassVar[Names] = ()
     origin: ClassVar[Origin | None] = None  # set by `store` on the records that it reads
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
     @classmethod
     def folder(cls) -> str:
@@ -189,7 +193,6 @@ class Record:
 AnyRecord = TypeVar("AnyRecord", bound=Record)
 
 
-@dataclass(frozen=True, eq=False)
 class LogRecord(Record):
     """A record of one log."""
 
@@ -198,7 +201,6 @@ class LogRecord(Record):
     log: str
 
 
-@dataclass(frozen=True, eq=False)
 class LogJointRecord(LogRecord):
     """A record of one joint during one log."""
 
@@ -207,7 +209,6 @@ class LogJointRecord(LogRecord):
     joint: str
 
 
-@dataclass(frozen=True, eq=False)
 class JointRecord(Record):
     """A record of one joint over all logs."""
 
@@ -216,7 +217,6 @@ class JointRecord(Record):
     joint: str
 
 
-@dataclass(frozen=True, eq=False)
 class RobotRecord(Record):
     """A record of the whole robot."""
 
@@ -230,7 +230,6 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
-@dataclass(frozen=True, eq=False)
 class Diagnostic(Record):
     """Messages of a stage to the reviewer: about omissions, assumptions and errors."""
 

@@ -1,11 +1,8 @@
 """Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
-from dataclasses import dataclass
-
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names
 
 
-@dataclass(frozen=True, eq=False)
 class LogSummary(LogRecord):
     """The summary of reading one log: its clock and rows, and the use of each channel."""
 
@@ -34,7 +31,6 @@ class LogSummary(LogRecord):
     nans: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Touch(LogRecord):
     """The contact channels of one log, which belong to no joint, as recorded; NaN without such a channel."""
 
@@ -54,7 +50,6 @@ class Touch(LogRecord):
     z: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Recording(LogJointRecord):
     """One joint during one log, as recorded: on the log's clock, in joint units."""
 
@@ -68,7 +63,6 @@ class Recording(LogJointRecord):
     filled: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Signal(LogJointRecord):
     """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
 
@@ -86,7 +80,6 @@ class Signal(LogJointRecord):
     filled: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Motion(LogJointRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
@@ -116,7 +109,6 @@ class Motion(LogJointRecord):
     filled: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Average(LogJointRecord):
     """One period of a joint, averaged over the periods of a recording, with the spread between them."""
 
@@ -148,7 +140,6 @@ class Average(LogJointRecord):
     count: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class PeriodResidual(LogJointRecord):
     """The difference of each sample from the mean of the periods at its phase."""
 
@@ -158,7 +149,6 @@ class PeriodResidual(LogJointRecord):
     tau_noise: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Trajectory(LogJointRecord):
     """One averaged period with its velocity and acceleration, without noise, and the level of that noise."""
 
@@ -181,7 +171,6 @@ class Trajectory(LogJointRecord):
     count: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Spectrum(LogJointRecord):
     """The amplitude of each harmonic of an averaged period: the harmonics kept, and those treated as noise."""
 

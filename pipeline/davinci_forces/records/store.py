@@ -29,6 +29,11 @@ Unit = Callable[[str], str]
 MMAP_THRESHOLD, TRIM_THRESHOLD = -3, -1  # glibc's options: sizes above which it maps memory, and returns its top
 MAX_HEAP_BYTES, MAX_TOP_BYTES = 1 << 24, 1 << 26  # less of both makes short studies take twice the system's time
 
+pa.set_memory_pool(pa.system_memory_pool())  # returns the memory of a long column as soon as it is free
+with suppress(OSError, AttributeError, TypeError):  # glibc alone has it, and on Windows nothing is loaded by None
+    CDLL(None).mallopt(MMAP_THRESHOLD, MAX_HEAP_BYTES)
+    CDLL(None).mallopt(TRIM_THRESHOLD, MAX_TOP_BYTES)
+
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
 
 
@@ -119,12 +124,8 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
 
     A record of more than `longest` rows reads a column when it is accessed, and does not keep it.
 
-    Raises
-    ------
-    MissingRecord
-        If the file does not exist.
-    BadRecord
-        If it is not a record of this kind and version; for a long one, also at the access of a column.
+    Raises MissingRecord if the file does not exist, and BadRecord if it is not a record of this kind and version.  A
+    long record raises BadRecord also at the access of a column.
     """
     whole = folder / place
     with _opened(kind, whole) as file:
@@ -179,19 +180,8 @@ def _rows_of(kind: type[Record], whole: Path, name: str, which: slice) -> np.nda
 
 def release() -> None:
     """Return to the system the memory that the C library retains after a task."""
-    with suppress(OSError, AttributeError, TypeError):  # glibc alone has it, and on Windows nothing is loaded by None
+    with suppress(OSError, AttributeError, TypeError):  # as above
         CDLL(None).malloc_trim(0)
-
-
-def _return_columns() -> None:
-    """Have the memory of a long column returned to the system as soon as it is free."""
-    pa.set_memory_pool(pa.system_memory_pool())
-    with suppress(OSError, AttributeError, TypeError):
-        CDLL(None).mallopt(MMAP_THRESHOLD, MAX_HEAP_BYTES)
-        CDLL(None).mallopt(TRIM_THRESHOLD, MAX_TOP_BYTES)
-
-
-_return_columns()
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:

@@ -1,11 +1,8 @@
 """Records of the force at the tip, and of a force sensor that measures the same force."""
 
-from dataclasses import dataclass
-
 from davinci_forces.records.record import Column, Counts, Labels, LogRecord, RobotRecord
 
 
-@dataclass(frozen=True, eq=False)
 class JointCorrelation(LogRecord):
     """The correlation of the external efforts of the joints that carry the tip, in one log of free motion."""
 
@@ -15,7 +12,6 @@ class JointCorrelation(LogRecord):
     rho_23: float
 
 
-@dataclass(frozen=True, eq=False)
 class ArmCorrelation(RobotRecord):
     """The correlation of the external efforts of the joints that carry the tip, in free space, of at most 20 logs.
 
@@ -28,7 +24,6 @@ class ArmCorrelation(RobotRecord):
     rho_23: Column
 
 
-@dataclass(frozen=True, eq=False)
 class TipForce(LogRecord):
     """The force that the tip exerts on its environment during one log, in base axes, with its covariance.
 
@@ -76,7 +71,6 @@ class TipForce(LogRecord):
     near_singular: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class TipContact(LogRecord):
     """The force at the tip in each contact of one log, at the time at which it is largest.
 
@@ -114,7 +108,6 @@ class TipContact(LogRecord):
     near_singular: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class TipBudget(LogRecord):
     """The contribution of each joint's error to the tip force, at the median pose of one log's free space."""
 
@@ -130,7 +123,6 @@ class TipBudget(LogRecord):
     total_force_std: Column
 
 
-@dataclass(frozen=True, eq=False)
 class SensorForce(LogRecord):
     """The estimated force in one log, the force of a sensor, and their difference.
 

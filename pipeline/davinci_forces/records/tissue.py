@@ -1,14 +1,12 @@
 """Records of pushes into tissue, and of haptic feedback."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord
 
 MAX_LISTED_PUSHES = 20  # up to this number of pushes in a log, results.json has each push
 
 
-@dataclass(frozen=True, eq=False)
 class Push(LogRecord):
     """One push into tissue: force against depth, the straight line through its contact, and the onset of contact."""
 
@@ -36,7 +34,6 @@ class Push(LogRecord):
     loading: Counts
 
 
-@dataclass(frozen=True, eq=False)
 class Stiffness(LogRecord):
     """The stiffness of the tissue of one log: the pushes, one a row, and their median."""
 
@@ -86,7 +83,6 @@ class Stiffness(LogRecord):
             yield from self.publish("tissue.{log}.{name}", names)
 
 
-@dataclass(frozen=True, eq=False)
 class TissueModel(LogRecord):
     """The models of tissue for one log, and the one with the best prediction of left-out pushes."""
 
@@ -107,7 +103,6 @@ class TissueModel(LogRecord):
     exponent_std: Column
 
 
-@dataclass(frozen=True, eq=False)
 class StabilityLimit(RobotRecord):
     """The largest stable tissue stiffness over the stiffness of the hand, without delay."""
 
@@ -118,7 +113,6 @@ class StabilityLimit(RobotRecord):
     k_t_switching: Column
 
 
-@dataclass(frozen=True, eq=False)
 class HandLimit(Record):
     """The largest stable tissue stiffness of one hand: the headline, its checks, and the best additional delay."""
 
@@ -162,7 +156,6 @@ class HandLimit(Record):
         return self.publish("stability.{hand}", " ".join((*names, *(f"{name}±" for name in measured))))
 
 
-@dataclass(frozen=True, eq=False)
 class HapticMotion(RobotRecord):
     """The motion of a hand against tissue beyond the limit of arbitrary switching, by switching law.  Fig 8.8, 8.10"""
 
@@ -176,7 +169,6 @@ class HapticMotion(RobotRecord):
     V: Column
 
 
-@dataclass(frozen=True, eq=False)
 class HapticResponse(RobotRecord):
     """The response of the felt force to the motion of a hand in the tissue, over frequency."""
 
@@ -193,7 +185,6 @@ class HapticResponse(RobotRecord):
     felt_late: Column
 
 
-@dataclass(frozen=True, eq=False)
 class HapticRun(Record):
     """One hand that moves in and out of the tissue, and its felt force.  Fig 8.12"""
 

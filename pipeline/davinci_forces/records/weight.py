@@ -1,11 +1,8 @@
 """Records of masses on the arm."""
 
-from dataclasses import dataclass
-
 from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRecord
 
 
-@dataclass(frozen=True, eq=False)
 class Load(LogJointRecord):
     """The effort of one joint per kilogram of a weight log's mass, along a log's path, and the external effort there.
 
@@ -28,7 +25,6 @@ class Load(LogJointRecord):
     tau_ext_unseen: Column
 
 
-@dataclass(frozen=True, eq=False)
 class Weight(LogRecord):
     """The mass on the arm in one log, from the external effort of the joints that it loads."""
 
@@ -74,7 +70,6 @@ class Weight(LogRecord):
     free_error_std: Column
 
 
-@dataclass(frozen=True, eq=False)
 class TorqueConstant(LogJointRecord):
     """The torque constant of a joint's motor that a known mass gives; a proposal, which no stage applies."""
 
@@ -86,7 +81,6 @@ class TorqueConstant(LogJointRecord):
     torque_constant_std: float
 
 
-@dataclass(frozen=True, eq=False)
 class FreeWeight(LogRecord):
     """The apparent mass on the arm in a log of free motion, where it should be 0."""
 

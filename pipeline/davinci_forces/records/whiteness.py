@@ -1,12 +1,10 @@
 """Records of signals that should be white, and of the reasons why they are not."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, Published
 
 
-@dataclass(frozen=True, eq=False)
 class Whiteness(LogJointRecord):
     """The whiteness of a signal: its autocorrelation and its tests."""
 
@@ -49,7 +47,6 @@ class Whiteness(LogJointRecord):
         return self.publish("ekf.{log}.{joint}", f"{tests} white=all_white")
 
 
-@dataclass(frozen=True, eq=False)
 class Innovation(LogJointRecord):
     """One innovation of the default filter: its size over the predicted size, and its correlation with the motion."""
 
@@ -73,7 +70,6 @@ class Innovation(LogJointRecord):
         return self.publish("ekf.{log}.{joint}", f"nis_{self.signal.removeprefix('innovation_')}=nis_own±")
 
 
-@dataclass(frozen=True, eq=False)
 class Explanation(LogJointRecord):
     """The reason why the innovations of the default filter are not white; a row tests one omission or correction.
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from davinci_forces.errors import BadRobot
 from davinci_forces.robots.robot import Joint, Kind, Limits, Robot
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile
 
 ROBOTS = ("davinci", "dvrk_psm")
-FILES = (".toml", ".urdf")  # formats in which laboratories describe their robots
+READERS = {".toml": "from_toml", ".urdf": "urdf.reading"}  # modules of formats in which laboratories describe robots
+FILES = tuple(READERS)
 
 __all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
 
@@ -17,10 +18,7 @@ __all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
 def load(name: str, folder: Path) -> Robot:
     """Load a listed robot by its name, or read a robot from a .toml or .urdf file in the folder.
 
-    Raises
-    ------
-    BadRobot
-        If there is no such robot or file, or the file has problems; the message lists each with its line.
+    Raises BadRobot if there is no such robot or file, or the file has problems; the message lists each with its line.
     """
     if name.endswith(FILES) and not (folder / name).exists():
         raise BadRobot(
@@ -36,25 +34,13 @@ def load(name: str, folder: Path) -> Robot:
 def read_with_problems(name: str, folder: Path) -> tuple[Robot | None, TomlFile | None]:
     """Load the robot as `load` does, None if its joints are unknown, and its file with its problems, if it has a file.
 
-    Raises
-    ------
-    BadRobot
-        If there is no such robot, or its file cannot be read at all.
+    Raises BadRobot if there is no such robot, or its file cannot be read at all.
     """
-    if name.endswith(".toml"):
-        from davinci_forces.robots import from_toml
-
-        return _from(name, from_toml.read_with_problems(folder / name))
-    if name.endswith(".urdf"):
-        from davinci_forces.robots.urdf import reading
-
-        return _from(name, reading.read_with_problems(folder / name))
+    for suffix, reader in READERS.items():
+        if name.endswith(suffix):
+            robot, file = import_module(f"davinci_forces.robots.{reader}").read_with_problems(folder / name)
+            return replace(robot, file=name) if robot else None, file
     if name not in ROBOTS:
         listed = f"{', '.join(ROBOTS)}, or a file that ends in {' or '.join(FILES)}"
         raise BadRobot(f"there is no robot {name!r}; name one of {listed}")
     return import_module(f"davinci_forces.robots.{name}").ROBOT, None
-
-
-def _from(name: str, result: tuple[Robot | None, TomlFile]) -> tuple[Robot | None, TomlFile]:
-    robot, file = result
-    return replace(robot, file=name) if robot else None, file

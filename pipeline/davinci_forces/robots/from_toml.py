@@ -1,35 +1,6 @@
 """Read a robot from a laboratory's TOML file, and changes to a listed robot.
 
-name = "my_arm"
-title = "Our arm"
-
-[[joint]]
-name = "shoulder"
-kind = "revolute"                       # or "prismatic"
-terms = ["inertia", "gravity, sine", "viscous friction", "Coulomb friction"]
-gear_ratio = 100.0                      # motor angle over joint position; 1 where logs give the joint side
-torque_constant = 0.05                  # [N m/A]; or, where it is not known, effort = "A"
-harmonics = 5                           # of the excitation
-limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }    # and effort = 10.0, which is not exceeded
-
-Where its geometry is known, each [[link]] has its Denavit-Hartenberg parameters and its mass.
-
-convention = "modified"                # or "classic"
-tip = "hand"                           # the link whose frame is the tip; by default the last link
-wrist = ["grip"]                       # coordinates beyond the joints, which move links but have no effort
-
-[[link]]
-name = "upper_arm"
-on = "base"                            # the link that carries it: the base, or a link before this one
-alpha = 0.0                            # [rad]
-a = 0.0                                # [m]
-d = 0.3                                # [m] at q = 0
-theta = 0.0                            # [rad] at q = 0
-moved_by = "shoulder"                  # a joint or wrist coordinate; without it the frame is fixed to its carrier
-sign = 1                               # -1 where it moves against its joint
-mass = 1.2                             # [kg]; with centre [m] and inertia [kg m^2] about it, in the link's own axes
-centre = [0.0, 0.0, 0.1]
-inertia = [0.01, 0.0, 0.0, 0.01, 0.0, 0.002]    # Ixx, Ixy, Ixz, Iyy, Iyz, Izz
+`guide/how-to/robot-file.md` describes the file: joints, links and all their keys with units.
 """
 
 import math
@@ -55,8 +26,7 @@ from davinci_forces.maths.mechanics.chain import (
 )
 from davinci_forces.maths.models.terms import TERMS, Term
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, UNLIMITED, Joint, Kind, Limits, Robot
-from davinci_forces.toml import TomlTable, excerpt, is_number
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable, excerpt, is_number
 
 NAME = re.compile(r"[a-z0-9_-]+")
 # Names that Windows reserves for devices, with any suffix; records are files with the names of logs and joints.

@@ -87,10 +87,7 @@ def coupled_arm(
 ) -> CoupledArm:
     """Model coupled joints (indices `rows`), each with viscous, Coulomb and added friction.
 
-    Raises
-    ------
-    ValueError
-        If the robot has no chain.
+    Raises ValueError if the robot has no chain.
     """
     if robot.chain is None:
         raise ValueError(f"{robot.name} has no chain")

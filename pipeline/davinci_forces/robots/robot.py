@@ -208,26 +208,14 @@ class Robot:
 
     @property
     def known_chain(self) -> Chain:
-        """The chain.
-
-        Raises
-        ------
-        BadRobot
-            If the robot's geometry is not known.
-        """
+        """The chain; raises BadRobot if the robot's geometry is not known."""
         if self.chain is None:
             raise BadRobot(f"robot {self.name} has no chain: its geometry is not known; use a URDF, or add [[link]]")
         return self.chain
 
     @property
     def known_bodies(self) -> Bodies:
-        """The bodies.
-
-        Raises
-        ------
-        BadRobot
-            If the masses of the robot's links are not known.
-        """
+        """The bodies; raises BadRobot if the masses of the robot's links are not known."""
         if self.bodies is None:
             raise BadRobot(f"robot {self.name} has no bodies: the masses of its links are not known")
         return self.bodies

@@ -4,7 +4,6 @@ import errno
 import os
 import traceback
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -43,11 +42,8 @@ class Outcome:
 def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
     """Run one task.  An error becomes its outcome, so that the other tasks go on.
 
-    Raises
-    ------
-    Exception
-        If the diagnostic of the error cannot be written, or the file `mark` is gone.  Then the run has ended, and the
-        next one may have removed what this task was writing.
+    Raises any error if its diagnostic cannot be written, or the file `mark` is gone.  Then the run has ended, and the
+    next one may have removed what this task was writing.
     """
     from davinci_forces.records import store  # here, so that a run in which all is up to date does not load pyarrow
 
@@ -96,7 +92,7 @@ def without_folders(message: str, folders: Folders) -> str:
 def arguments(folders: Folders, task: Task) -> dict[str, Any]:
     """The keyword arguments of a task's function."""
     asks = declaration(task.step)
-    values: dict[str, Any] = dict(task.settings)
+    values: dict[str, Any] = dict(task.fingerprint.settings)
     for parameter, located in task.records.items():
         if parameter in asks.in_turn:
             values[parameter] = InTurn(folders, task, located)
@@ -144,8 +140,7 @@ def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
 _read_cached = lru_cache(maxsize=256)(_read)
 
 
-@contextmanager
-def _writer(folders: Folders, task: Task) -> Iterator["store.Writer"]:
+def _writer(folders: Folders, task: Task) -> "store.Writer":
     from davinci_forces.records import store
 
     def unit(record: Record) -> "store.Unit":
@@ -153,8 +148,7 @@ def _writer(folders: Folders, task: Task) -> Iterator["store.Writer"]:
         kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
         return lambda template: kind.unit(template, measured)
 
-    with store.Writer(folders.processed, unit, vars(task.fingerprint)) as writer:
-        yield writer
+    return store.Writer(folders.processed, unit, vars(task.fingerprint))
 
 
 def _made(writer: "store.Writer") -> dict[str, str]:

@@ -167,7 +167,12 @@ class Ledger:
         if name not in self._digests:
             root, _, path = name.partition("/")
             file = f"{getattr(self.folders, root)}{os.sep}{path}"
-            self._digests[name] = _digest(file)
+            try:
+                self._digests[name] = digest(file)
+            except OSError:  # nearly all files exist, so this is faster than checking first
+                if os.path.isfile(file):
+                    raise
+                self._digests[name] = ""
         return self._digests[name]
 
     def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
@@ -197,12 +202,8 @@ def seal(entry: Entry) -> str:
 def check(entry: Entry, stage: str, name: str) -> Entry:
     """Check that a run would write this entry under this stage and name, and return it.
 
-    Raises
-    ------
-    ValueError
-        If the entry is of another task, or names a file that no stage writes, which a run would remove.
-    TypeError
-        If a part of it has the wrong type.
+    Raises ValueError if the entry is of another task, or names a file that no stage writes, which a run would remove.
+    Raises TypeError if a part of it has the wrong type.
     """
     fingerprint = entry.fingerprint if isinstance(entry.fingerprint, dict) else {}
     tables = [entry.outputs, *map(fingerprint.get, PARTS)]
@@ -232,12 +233,3 @@ def _read(file: str) -> Entry:
         os.path.basename(os.path.dirname(file)),
         os.path.basename(file).removesuffix(".json"),
     )
-
-
-def _digest(file: str) -> str:
-    try:
-        return digest(file)
-    except OSError:  # nearly all files exist, so this is faster than checking first
-        if os.path.isfile(file):
-            raise
-        return ""

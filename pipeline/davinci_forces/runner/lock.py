@@ -103,12 +103,8 @@ def start_of(process: int) -> str | None:
 def hold_lock(folder: Path) -> Iterator[bool]:
     """Hold the lock of a processed folder, and yield whether it is held: a read-only folder needs none.
 
-    The lock of a process that has ended is ignored.
-
-    Raises
-    ------
-    BadRequest
-        If another process holds the lock, or one on another host may hold it.
+    The lock of a process that has ended is ignored.  Raises BadRequest if another process holds the lock, or one on
+    another host may hold it.
     """
     if folder.is_dir() and not os.access(folder, os.W_OK):
         yield False

@@ -31,7 +31,6 @@ class Task:
     fingerprint: Fingerprint
     records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
     given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
-    settings: dict[str, Any] = field(default_factory=dict)
     joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # by joint, for the units of its records
 
     @property
@@ -108,7 +107,7 @@ class Plan:
         }
         digests = {name: self.ledger.digest(name) for name in sorted(inputs)}
         fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), code_of(asks), __version__)
-        return Task(asks.name, name, fingerprint, records, values, settings, self._joints)
+        return Task(asks.name, name, fingerprint, records, values, self._joints)
 
     def _given(self, what: str, log: str, joint: str) -> Any:
         """An argument of a task other than its records; for a log, its entry in study.toml."""

@@ -42,10 +42,7 @@ def has_same_environment(folders: Folders) -> bool:
 def recompute(folders: Folders, by_bytes: bool, jobs: int = 1) -> list[str]:
     """Recompute a study from raw/ in a temporary folder, and compare files byte by byte, or else numbers.
 
-    Raises
-    ------
-    NotReproduced
-        If a task fails that did not fail before, or files or numbers do not agree.
+    Raises NotReproduced if a task fails that did not fail before, or files or numbers do not agree.
     """
     with TemporaryDirectory(prefix="davinci-forces-") as home:
         new = runs.folders(folders.raw, Path(home, "processed"), Path(home, "reports"))

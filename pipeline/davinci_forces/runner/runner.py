@@ -62,10 +62,7 @@ class Runner:
     def run(self, names: Iterable[str]) -> bool:
         """Run these stages, groups or the report after the stages that they need; return whether all tasks succeeded.
 
-        Raises
-        ------
-        PipelineError
-            If another run is working on the study.
+        Raises PipelineError if another run is working on the study.
         """
         steps = self._steps(names)
         self.seconds = dict.fromkeys(map(stage_of, steps), 0.0)
@@ -177,11 +174,9 @@ class Runner:
             for reason, names in _grouped(progress.reasons).items():
                 self.console.say(f"{_listed(stage_of(step), names)}: {reason}")
             progress.reasons.clear()
-        function = (
-            partial(reporting.perform, self.ledger)
-            if step == REPORT
-            else partial(self.perform or perform, self.folders)
-        )
+        function = partial(self.perform or perform, self.folders)
+        if step == REPORT:
+            function = partial(reporting.perform, self.ledger)
         for part, tasks in due.items():
             self._due[part] = len(tasks) + 1
             for task in tasks:

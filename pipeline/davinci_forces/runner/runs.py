@@ -28,10 +28,7 @@ def folders(study: Path, processed: Path | None, reports: Path | None) -> Folder
 def studies(names: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[Path]:
     """The folders of the named studies, patterns expanded; without names, of all studies in raw/ that have logs.
 
-    Raises
-    ------
-    BadStudy
-        If there is no name and no study in raw/, or a pattern matches no folder.
+    Raises BadStudy if there is no name and no study in raw/, or a pattern matches no folder.
     """
     if names:
         yield from (folder for name in names for folder in expand_pattern(name))
@@ -84,12 +81,7 @@ def single_study(name: Path) -> Path:
 def results_of(name: Path, reports: Path | None = None) -> Path:
     """The results.json of this name, or the results.json of the report folder or study of this name.
 
-    Raises
-    ------
-    BadRequest
-        If a folder holds neither a study nor results.
-    MissingRecord
-        If a study has no results yet.
+    Raises BadRequest if a folder holds neither a study nor results; MissingRecord if a study has no results yet.
     """
     if name.exists() and not name.is_dir():
         return name
@@ -109,10 +101,7 @@ def results_of(name: Path, reports: Path | None = None) -> Path:
 def load(folder: Path) -> Study:
     """Read a study, and warn of outdated settings and missing files; the logs of missing files will fail.
 
-    Raises
-    ------
-    BadStudy
-        With all problems at once, or if all files are missing.
+    Raises BadStudy with all problems at once, or if all files are missing.
     """
     study = reading.read(folder)
     absent = study.absent()

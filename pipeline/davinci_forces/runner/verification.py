@@ -48,11 +48,7 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     """Hash all files that a run reads and makes, compare the ledger with the plan, and render the report again.
 
     `report_id` is the expected one, or "" for any.  Without `pages`, only the numbers of the report are compared.
-
-    Raises
-    ------
-    NotReproduced
-        With all differences, one per line.
+    Raises NotReproduced with all differences, one per line.
     """
     ledger = Ledger(folders)
     recorded = known_files(ledger)
@@ -150,14 +146,12 @@ def stale(ledger: Ledger, tasks: Sequence[Task]) -> Iterator[str]:
     by_reason: dict[str, list[str]] = {}
     for task in tasks:
         entry = ledger.entry(task.step, task.name)
-        if entry is None:
-            by_reason.setdefault("it is not in the ledger, so it has not run, or its entry was removed", []).append(
-                task.name
-            )
-        elif not entry.failed:
-            changed = (r for r in ledger.reasons(entry, task.fingerprint) if not r.endswith("was altered"))
-            for reason in list(changed)[:2]:
-                by_reason.setdefault(reason, []).append(task.name)
+        reasons = ["it is not in the ledger, so it has not run, or its entry was removed"]
+        if entry is not None:
+            changed = [] if entry.failed else ledger.reasons(entry, task.fingerprint)
+            reasons = [reason for reason in changed if not reason.endswith("was altered")][:2]
+        for reason in reasons:
+            by_reason.setdefault(reason, []).append(task.name)
     for reason, names in by_reason.items():
         yield f"{stage_of(tasks[0].step)}: {shorten(names)}: {reason}"
 

@@ -129,7 +129,6 @@ class Study:
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
     haptics: HapticScenario = field(default_factory=HapticScenario)  # the simulated hand that feels the tissue
     baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
-    robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
     remarks: tuple[str, ...] = field(default=(), compare=False)  # warnings for the author, each with its line
 

@@ -24,8 +24,7 @@ from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study.guessing import Holding, Meaning, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
-from davinci_forces.toml import TomlTable
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, TomlTable
 
 ROBOT_FILE = "robot.toml"  # written next to study.toml if no robot fits
 DEFAULT_ROBOT = "davinci"
@@ -80,15 +79,17 @@ def arm_of(
     if not counted:
         described = [arm for arm in arms if arm.reason]
         return described[0] if len(described) == 1 else next(arm for arm in arms if arm.name == DEFAULT_ROBOT)
+    words = {word for name in names for word in words_of(name)}
     for arm in arms:
         if any(holding.robot == arm.robot for holding in counted):
-            return _of_the_kit(arm, names, folder)._replace(reason=arm.reason or "by the joints in channel names")
+            if arm.name == DEFAULT_ROBOT and words & {"psm", "dvrk"}:  # the kit's joints have the same names
+                arm = Arm("dvrk_psm", robots.load("dvrk_psm", folder), "")
+            return arm._replace(reason=arm.reason or "by the joints in channel names")
     n = max(holding.joints for holding in counted)
     current = any("i" in holding.symbols() for holding in counted)
     beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
     if beside:
         return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")
-    words = {word for name in names for word in words_of(name)}
     said = next((word for word in DAVINCI_WORDS if word in words), "")
     if all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
         name = "davinci" if current else "dvrk_psm"
@@ -105,13 +106,6 @@ def arm_of(
     joints, why = "joint" if n == 1 else f"{n} joints", "; ".join(why_not) or "--robot names one"
     reason = f"written for the {joints} of the logs, as no shipped robot fits; {why}"
     return Arm(name, new_robot, reason, text)
-
-
-def _of_the_kit(arm: Arm, names: Sequence[str], folder: Path) -> Arm:
-    """The arm of the da Vinci Research Kit, where names say that; its joints have the names of `davinci`."""
-    words = {word for name in names for word in words_of(name)}
-    is_kit = arm.name == DEFAULT_ROBOT and words & {"psm", "dvrk"}
-    return Arm("dvrk_psm", robots.load("dvrk_psm", folder), "") if is_kit else arm
 
 
 def _is_davinci(holding: Holding, is_named: bool) -> bool:

@@ -88,10 +88,7 @@ class Holding:
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     """Guess what the channels of a log hold; the joints of `robots` may be named in it.
 
-    Raises
-    ------
-    BadLog
-        Where the log is damaged.
+    Raises BadLog where the log is damaged.
     """
     numbers = [channel for channel in log.channels if channel.kind == "number" and not channel.derived]
     if not 0 < len(numbers) <= MAX_CHANNELS:
@@ -102,28 +99,25 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
         holding = max(by_numbers(numbers), by_words(numbers), key=lambda h: len(h.meanings))
     if holding.is_complete:
         return _read_motion(log, holding)
-    if any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
-        times = [channel.name for channel in numbers if is_time(channel)]
-        samples = {name: samples_of(log, [name])[name] for name in times}
-        timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
-        by_name = timing.missing and times and not has_clock(log)
-        content = _by_content(log, [channel.name for channel in numbers])
-        if any(robot.file and len(robot.joints) == content.joints for robot in robots):
-            check = {
-                n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
-            }
-            return replace(content, meanings=check)
-        return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
-    return _by_content(log, [channel.name for channel in numbers])
+    content = _by_content(log, [channel.name for channel in numbers])
+    if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
+        return content
+    if any(robot.file and len(robot.joints) == content.joints for robot in robots):
+        check = {
+            n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
+        }
+        return replace(content, meanings=check)
+    times = [channel.name for channel in numbers if is_time(channel)]
+    samples = {name: samples_of(log, [name])[name] for name in times}
+    timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
+    by_name = timing.missing and times and not has_clock(log)
+    return Holding(timing=TimeGuess(times[0], reason="CHECK: in seconds by its name alone") if by_name else timing)
 
 
 def clock_hint(log: Log) -> str:
     """Propose the times of a log without a clock: a channel, or a rate by its velocities; "" where neither is found.
 
-    Raises
-    ------
-    BadLog
-        Where the log is damaged.
+    Raises BadLog where the log is damaged.
     """
     names = [channel.name for channel in log.channels if channel.kind == "number" and not channel.derived]
     if has_clock(log) or named_time(log) or not 0 < len(names) <= MAX_CHANNELS or len(log.by_clock(names)) > 1:
@@ -193,6 +187,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     units = {channel.name: stated_unit(channel) for channel in channels}
     meanings: dict[str, Meaning] = {}
     for symbol, group in groups.items():
+        usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(group.words) else ""
         for label, name in group.names.items():
             if label.isdecimal() and len(numbers) == len(labels):
                 joint, reason = int(label) - first, "by the number in its name"
@@ -200,9 +195,8 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
                 joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
             else:
                 continue
-            unit = "" if units[name] else _usual(symbol, group.words)
             motor = AT_MOTOR.get(symbol, symbol) if "motor" in words_of(name) else symbol
-            meanings[name] = Meaning(motor, joint, reason, unit)
+            meanings[name] = Meaning(motor, joint, reason, "" if units[name] else usual)
     meanings = _with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
@@ -225,11 +219,6 @@ def by_words(channels: Sequence[Channel]) -> Holding:
         for symbol, names in named.items() for label, name in names.items() if label in labels
     }  # fmt: skip
     return Holding(_with_one_effort(meanings), len(labels), tuple(labels))
-
-
-def _usual(symbol: str, words: Sequence[str]) -> str:
-    """The unit that a recorder is known to use: degrees of Kinova's actuators and of KUKA's AIPos."""
-    return {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(words) else ""
 
 
 def _by_content(log: Log, names: Sequence[str]) -> Holding:

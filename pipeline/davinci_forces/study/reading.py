@@ -33,10 +33,8 @@ OUTDATED_SETTINGS = ("derivative",)  # settings without effect that earlier vers
 def read(folder: Path) -> Study:
     """Read and validate `folder/study.toml`; `Study.absent` lists logs that do not exist.
 
-    Raises
-    ------
-    BadStudy
-        With every problem of the file and of the robot's file, one a line, and then every log that does not exist.
+    Raises BadStudy with every problem of the file and of the robot's file, one a line, and then every log that does not
+    exist.
     """
     missing = "there is no such file; `davinci-forces new` writes one from a log"
     return study_of(toml.read(folder / "study.toml", BadStudy, missing), folder)
@@ -72,12 +70,9 @@ def study_of(table: TomlTable, folder: Path) -> Study:
         _note_missing_clocks(table, logs, folder)
     table.file.refuse(BadStudy)
     assert robot is not None
-    robot_file = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
     changed = overrides.values | {name: table.values[name] for name in ("tool", "base") if name in table}
-    return Study(
-        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, robot_file, lines, remarks
-    )
+    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, lines, remarks)
 
 
 def _note_missing_clocks(table: TomlTable, logs: Sequence[LogEntry], folder: Path) -> None:

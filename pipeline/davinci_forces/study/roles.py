@@ -132,6 +132,7 @@ def _by_motion(
     for i in fixed:
         _cover(reach, recordings[i])
     excited = {i: _word(recordings[i].path)[0] == "excitation" for i in rest}
+    identifying = {i: recordings[i].holding.repeats or excited[i] for i in rest}
     order = sorted(
         rest, key=lambda i: (not recordings[i].holding.repeats, not excited[i], *_size(recordings[i].holding))
     )
@@ -140,19 +141,16 @@ def _by_motion(
     }
     late: list[int] = []
     moved = {joint for i in rest if recordings[i].holding.repeats for joint in recordings[i].holding.moving}
-    others = (recordings[i].holding for i in rest if not (recordings[i].holding.repeats or excited[i]))
+    others = (recordings[i].holding for i in rest if not identifying[i])
     is_tested = any(tested) or any(moved <= set(other.moving) and not other.steady for other in others)
     for i in order:
         holding, spans = recordings[i].holding, _spans(recordings[i].holding)
         within = next((reach[joint][1] for joint in spans if joint in reach), "")
         if holding.steady and not excited[i] and varied & set(holding.moving):
             roles[i] = Role("friction", "its joint moves at one constant velocity after another")
-        elif not holding.repeats and not excited[i] and set(spans) - set(reach):
+        elif not identifying[i] and set(spans) - set(reach):
             late.append(i)
-        elif (is_tested and (holding.repeats or excited[i])) or (
-            any(span > WIDER * reach.get(joint, (0.0, ""))[0] for joint, span in spans.items())
-            and (holding.repeats or excited[i])
-        ):
+        elif identifying[i] and (is_tested or any(x > WIDER * reach.get(k, (0.0, ""))[0] for k, x in spans.items())):
             roles[i] = Role("identification", '"excitation" in its name' if excited[i] else "its motion repeats")
             _cover(reach, recordings[i])
         elif holding.repeats:

@@ -48,13 +48,11 @@ class Row(NamedTuple):
 
 
 class Draft(NamedTuple):
-    """The text of a study.toml, the file of its robot where that has to be written, too, and a row for each log."""
+    """The text of a study.toml, its robot, whose file may have to be written, too, and a row for each log."""
 
     text: str
-    robot_file: str = ""
-    robot_text: str = ""
-    rows: tuple[Row, ...] = ()
-    robot_reason: str = ""
+    arm: Arm
+    rows: tuple[Row, ...]
 
 
 @dataclass(frozen=True)
@@ -98,14 +96,8 @@ def logs_in(paths: Sequence[Path]) -> list[Path]:
 def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft:
     """Draft a study.toml that names every channel of every log and guesses its content; "" guesses the robot, too.
 
-    Raises
-    ------
-    BadRequest
-        If a log or the robot's file lies outside the study's folder, or there is no log.
-    BadLog
-        If no log can be read, with the reason for each.
-    BadRobot
-        If the robot cannot be read.
+    Raises BadRequest if a log or the robot's file lies outside the study's folder, or there is no log.  Raises BadRobot
+    if the robot cannot be read, and BadLog with the reason for each log if none can be read.
     """
     for file in files:
         if not file.resolve().is_relative_to(folder.resolve()):
@@ -136,7 +128,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
         rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
-    return Draft(text, arm.name if arm.text else "", arm.text, tuple(rows), arm.reason)
+    return Draft(text, arm, tuple(rows))
 
 
 def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
@@ -210,15 +202,9 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     if arm.name.endswith(".urdf"):
         by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
-        yield from _in_amperes([joint for k, joint in enumerate(robot.joints) if k in by_current])
-
-
-def _in_amperes(joints: Sequence[Joint]) -> Iterator[str]:
-    """Lines that make currents the effort of joints, as a URDF has no torque constants."""
-    for joint in joints:
-        yield ""
-        yield f"[robot_overrides.{joint.name}]"
-        yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
+        for joint in (joint for k, joint in enumerate(robot.joints) if k in by_current):  # a URDF states no drives
+            yield from ("", f"[robot_overrides.{joint.name}]")
+            yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
@@ -412,10 +398,9 @@ def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
 
 def _time_line(channel: Channel, size: float, reason: str) -> str:
     """The line of a channel of times, with its unit where the log does not state one that is known."""
-    units = {1.0: "", 1e-3: ', unit = "ms"'}
     if measures(canonical(channel.unit)) == "time" or size == 1.0:
         return f"time = {_text(channel.name)}  # {reason}"
-    unit = units.get(size, f', scale = {size!r}, unit = "s"')
+    unit = ', unit = "ms"' if size == 1e-3 else f', scale = {size!r}, unit = "s"'
     return f"time = {{ channel = {_text(channel.name)}{unit} }}  # {reason}"
 
 

@@ -52,10 +52,7 @@ class TimeGuess:
 def samples_of(log: Log, names: Sequence[str]) -> dict[str, Array]:
     """Read the first samples of these channels of one clock, without the last rows that a channel lacks.
 
-    Raises
-    ------
-    BadLog
-        Where the log is damaged.
+    Raises BadLog where the log is damaged.
     """
     parts: dict[str, list[Array]] = {name: [] for name in names}
     rows = 0

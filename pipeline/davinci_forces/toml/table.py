@@ -11,8 +11,7 @@ from typing import Any
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.files import read_bytes, text_of
-from davinci_forces.toml.file import TomlFile
-from davinci_forces.toml.lines import KeyPath, excess, lines_of
+from davinci_forces.toml.lines import KeyPath, TomlFile, excess, lines_of
 from davinci_forces.toml.ranges import unlikely
 
 MAX_NAME_LENGTH = 100  # characters of an unknown key; a longer key is cut before it is compared with known keys
@@ -194,10 +193,7 @@ TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read. Is it a log?
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
     """Read the whole of a file; its values are checked when they are taken from the table.
 
-    Raises
-    ------
-    PipelineError
-        Of that kind, if the file cannot be read or is not TOML.
+    Raises an error of that kind if the file cannot be read or is not TOML.
     """
     try:
         text = text_of(read_bytes(file, MAX_BYTES, TOO_LARGE), "utf-8-sig")

@@ -20,10 +20,7 @@ TEMPLATES = ("package.xml", "setup.py", "node.py")
 def render(export: Export) -> Rendering:
     """Render the package, to be built by colcon.
 
-    Raises
-    ------
-    BadRequest
-        If a joint has no filter, or filters have different rates.
+    Raises BadRequest if a joint has no filter, or filters have different rates.
     """
     document = export.document()
     try:

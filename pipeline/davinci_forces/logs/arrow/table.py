@@ -14,7 +14,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_COLUMNS
 from davinci_forces.logs.cells import absent, integers, numbers
-from davinci_forces.logs.log import Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import Block, Channel, Log, unique
 from davinci_forces.logs.timeline import UNIX_EPOCH, moment
 from davinci_forces.maths.arrays import Array
 
@@ -31,7 +31,7 @@ PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the file; raises BadLog if it has no columns, or one name twice."""
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):

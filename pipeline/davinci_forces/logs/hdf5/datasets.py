@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.log import Log
 
 UNIT_ATTRIBUTES = ("units", "unit", "Units", "Unit")
 CACHE = 64 << 20  # [bytes] of unpacked chunks kept per dataset, at most
@@ -21,7 +21,7 @@ SLOTS = 521  # of HDF5's chunk cache, HDF5's default
 MAX_REFERENCES = 1000
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the file; raises BadLog if it holds no dataset of samples."""
     file = h5py.File(path, "r", locking=False)
     log = ArrayLog(path, "hdf5", ())

@@ -28,18 +28,14 @@ HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hol
 
 
 def read(path: Path, options: Options, reader: str, package: str = "") -> Log:
-    """Open a log in a child process; `reader` is a module that exports `open_in_child(path, options) -> Log`.
+    """Open a log in a child process; `reader` is a module that exports `open_in_child(path) -> Log`.
 
-    It may need an optional package, which not every installation has.
-
-    Raises
-    ------
-    BadLog
-        If that package is not installed, or the log cannot be read within the limits.
+    It may need an optional package, which not every installation has.  Raises BadLog if that package is not installed,
+    or the log cannot be read within the limits.
     """
     if package and find_spec(package) is None:
         raise BadLog(f"{path}: {package}, which reads it, is not installed; run: {install(package)}")
-    request = _request(path, options, reader)
+    request = _request(path, reader)
     for message, _ in _answers(path, request):
         state = message
     return IsolatedLog(path, request=request, **state)
@@ -78,12 +74,11 @@ class IsolatedLog(Log):
         self.cut |= end["cut"]
 
 
-def _request(path: Path, options: Options, reader: str) -> Message:
+def _request(path: Path, reader: str) -> Message:
     size = _size(path)
     return {
         "reader": reader,
         "path": str(path.absolute()),
-        "options": options,
         "names": None,
         "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND,

@@ -53,10 +53,10 @@ def _answers(request: Message) -> Iterator[Answer]:
     """Yield the description of an opened log, or its blocks."""
     path = Path(request["path"])
     about = path.stat()
-    key = (request["reader"], path, request["options"], about.st_mtime_ns, about.st_size)
+    key = (request["reader"], path, about.st_mtime_ns, about.st_size)
     if key not in _opened:
         _opened.clear()
-        _opened[key] = import_module(request["reader"]).open_in_child(path, request["options"])
+        _opened[key] = import_module(request["reader"]).open_in_child(path)
     log, names = _opened[key], request["names"]
     if names is None:
         yield {name: getattr(log, name) for name in FIELDS}, []

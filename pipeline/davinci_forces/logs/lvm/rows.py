@@ -120,10 +120,8 @@ class Reading:
         columns = self._columns_of(run, self.together)
         if not self.together or not all(i in cells.empty for i in columns):
             return None
-        none: Booleans = np.ones(cells.rows, dtype=bool)
-        for i in columns:
-            none &= cells.empty[i]
-        return ~none
+        masks = [np.ones(cells.rows, dtype=bool), *(cells.empty[i] for i in columns)]
+        return np.asarray(~np.logical_and.reduce(masks))
 
     def _own_times(self, clock: OwnClock, run: Run, cells: Cells, before: int) -> Array:
         """Compute the times [s] since the start of the log of channels on another clock than the first."""

@@ -86,12 +86,8 @@ class Walk:
         """Split a block of complete lines into runs of rows.
 
         `take` is called with a possible run and its number of lines, and returns None if it is no run.  Such a block is
-        halved, until only the lines around the problem are read one by one.
-
-        Raises
-        ------
-        BadHeader
-            If a header makes the file unreadable; `line` says where.
+        halved, until only the lines around the problem are read one by one.  Raises BadHeader if a header makes the
+        file unreadable; `line` says where.
         """
         run = self._whole(block)
         if run and (taken := take(run, block.lines)) is not None:

@@ -15,7 +15,7 @@ from scipy.io.matlab import MatlabFunction, MatlabOpaque, varmats_from_mat
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.log import Log
 from davinci_forces.logs.mat.objects import MatlabObject, Objects, is_object, seconds, text_of, uniform_times
 
 MAX_ELEMENTS = 1000  # of a struct array or a cell array
@@ -23,7 +23,7 @@ NESTED = ("cell", "struct", "object", "char", "unknown")  # classes of variables
 OBJECT = "None"  # scipy's name of a variable that holds an object
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the file; raises BadLog if it holds no variable of samples."""
     log = ArrayLog(path, "mat", ())
     with open_file(path) as file:

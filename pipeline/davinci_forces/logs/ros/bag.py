@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.log import Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import Block, Channel, Log, unique
 from davinci_forces.logs.ros.layout import Layout, Unlike, layout_of, numbers_at, stamps_at
 from davinci_forces.logs.ros.scan import Batch
 from davinci_forces.logs.ros.storage import Bag, types_of
@@ -55,7 +55,7 @@ class Topic:
         return bool(self.first.joints and layout.joints) and not set(self.first.joints) & set(layout.joints)
 
 
-def open_in_child(path: Path, options: Options) -> Log:
+def open_in_child(path: Path) -> Log:
     """Open the bag; raises BadLog if none of its topics has numbers."""
     bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag, cut=bag.cut, warnings=bag.warnings)
@@ -152,14 +152,13 @@ def _short(kind: str) -> str:
 class BagLog(Log):
     """An opened bag.  Times count from the first message of all topics."""
 
-    bag: Bag | None = None
+    bag: Bag = field(kw_only=True)
     topics: list[Topic] = field(default_factory=list)
     origin: int = 0  # [ns] since 1970
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         if not names:
             return
-        assert self.bag
         topic = next(t for t in self.topics if any(channel.name == names[0] for channel in t.channels(True)))
         number = 0  # of the first message of a batch
         for connections, batch in self.bag.batches(topic.connections):

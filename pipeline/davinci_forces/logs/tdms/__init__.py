@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -13,7 +12,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, unique
 from davinci_forces.logs.tdms import samples
-from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, clocks_of
+from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, set_clocks
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBER_CODES, TIME, Objects, names
 from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, Queue, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
@@ -107,7 +106,8 @@ class TdmsLog(Log):
             row += count
 
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        paths = [self._path_of[name] for name in dict.fromkeys(asked_for)]
+        path_of = {name: path for path, name in self.names.items()}
+        paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.groups([path for path in paths if path not in self.scaled])
         scaled = self.index.groups([path for path in paths if path in self.scaled])
         with open_file(self.path) as file:
@@ -115,10 +115,6 @@ class TdmsLog(Log):
             for block, lacking in side_by_side(queues, rows_of(len(paths))):
                 missing = {self.names[path]: count for path, count in lacking.items()}
                 yield self.count_nans({self.names[path]: samples for path, samples in block.items()}, missing)
-
-    @cached_property
-    def _path_of(self) -> dict[str, str]:
-        return {name: path for path, name in self.names.items()}
 
     def _source(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         if paths[0] in self.scaled:
@@ -191,13 +187,11 @@ def _describe_time(
         name: Sampled(names(path)[0], sizes[name], kinds[name] == "time", timelines.get(path))
         for path, name in log.names.items()
     }
-    clocks = clocks_of(log.channels, sampled, log.cut)
-    log.channels, log.clock, log.time, log.made = clocks.channels, clocks.clock, clocks.time, clocks.made
-    log.lent = clocks.lent
+    log.made = set_clocks(log, sampled)
     starts = (words.get("wf_start_time") for path, words in properties.items() if path in log.names)
     if started := started or next((start for start in starts if isinstance(start, datetime)), None):
         log.zone, log.started = "UTC", started.replace(tzinfo=None).isoformat()
-    for name, timeline in clocks.made.items():
+    for name, timeline in log.made.items():
         if gaps := [f"{first}" for first in timeline.first[1:]]:
             some = ", ".join(gaps[:5]) + (" ..." if len(gaps) > 5 else "")
             log.warnings.append(

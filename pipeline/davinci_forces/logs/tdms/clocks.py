@@ -6,7 +6,7 @@ from datetime import datetime
 from math import isfinite
 from typing import Any, NamedTuple
 
-from davinci_forces.logs.log import Channel, Clock, unique
+from davinci_forces.logs.log import Channel, Clock, Log, unique
 from davinci_forces.logs.tdms.metadata import EPOCH
 from davinci_forces.logs.tdms.walk import Region
 from davinci_forces.logs.timeline import Timeline, group_by_clock
@@ -22,46 +22,35 @@ class Sampled:
     timeline: Timeline | None
 
 
-@dataclass(frozen=True)
-class ClocksFound:
-    """The channels with their clocks, and the clock of the log."""
-
-    channels: tuple[Channel, ...]
-    clock: Clock | None = None
-    time: str = ""
-    made: dict[str, Timeline] = field(default_factory=dict)  # the derived time channels
-    lent: dict[str, str] = field(default_factory=dict)  # by channel without words on its clock, whose clock it is given
-
-
-def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> ClocksFound:
-    """Find the clock of every channel; `ends_anywhere` marks a truncated file, in which lengths prove nothing.
+def set_clocks(log: Log, sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
+    """Set the clocks of a log and of its channels, and return the derived time channels by name.
 
     The first clock becomes that of the log, unless some channels have no clock: they would wrongly inherit it.
     """
-    clock_of = _shared(channels, sampled, ends_anywhere)
-    lent = {n: c for n, c in clock_of.items() if c and sampled[c].timeline and not sampled[n].timeline}
+    clock_of = _shared(log.channels, sampled, log.cut)
     clocks = list(dict.fromkeys(clock_of.values()))
     if not any(clocks):
-        return ClocksFound(tuple(channels))
-    main = clocks[0] if "" not in clocks else None
-    named = dict(zip(clocks, _names(clocks, channels, sampled), strict=True))
+        return {}
+    log.lent = {n: c for n, c in clock_of.items() if c and sampled[c].timeline and not sampled[n].timeline}
+    named = dict(zip(clocks, _names(clocks, log.channels, sampled), strict=True))
     longest = _longest(clock_of, sampled)
     derived = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
-    timed = tuple(replace(c, time="" if clock_of[c.name] in (main, "") else named[clock_of[c.name]]) for c in channels)
-    if main and named[main] in derived and len(derived[named[main]].first) == 1:
-        timeline = derived.pop(named[main])
-        return ClocksFound(_with(timed, derived), Clock(timeline.step[0], timeline.start[0]), "", derived, lent)
-    time = named[main] if main else ""
-    return ClocksFound(_with(timed, derived, time), None, time, derived, lent)
-
-
-def _with(channels: tuple[Channel, ...], derived: Mapping[str, Timeline], main: str = "") -> tuple[Channel, ...]:
-    times = (Channel(name, "s", "time", derived=True, time="" if name == main else name) for name in derived)
-    return (*channels, *times)
+    main = clocks[0] if "" not in clocks else ""
+    log.time = named[main] if main else ""
+    if log.time in derived and len(derived[log.time].first) == 1:
+        timeline = derived.pop(log.time)
+        log.time, log.clock = "", Clock(timeline.step[0], timeline.start[0])
+    times = {name: "" if clock in (main, "") else named[clock] for name, clock in clock_of.items()}
+    added = (Channel(name, "s", "time", derived=True, time="" if name == log.time else name) for name in derived)
+    log.channels = (*(replace(channel, time=times[channel.name]) for channel in log.channels), *added)
+    return derived
 
 
 def _shared(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> dict[str, str]:
-    """Map each channel to the first channel on its clock; "" if its clock is unknown."""
+    """Map each channel to the first channel on its clock, or to "" if that is unknown.
+
+    `ends_anywhere` marks a truncated file, in which lengths prove nothing.
+    """
     stamps: dict[str, str] = {}
     for name, s in sampled.items():
         if s.is_stamps:

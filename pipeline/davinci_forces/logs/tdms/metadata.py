@@ -22,7 +22,6 @@ NUMBER_CODES = {
 COMPLEX = (0x08000C, 0x10000D)
 SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of one value, except text
 SIZES |= {kind: np.dtype(code).itemsize for kind, code in NUMBER_CODES.items()}
-OCTETS = {"I": 4, "Q": 8, "q": 8}  # [bytes] of the numbers in metadata
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
@@ -86,7 +85,7 @@ class _Cursor:
 
     def number(self, code: str) -> int:
         (value,) = struct.unpack_from(self.order + code, self.data, self.at)
-        self.at += OCTETS[code]
+        self.at += struct.calcsize(self.order + code)
         return int(value)
 
     def bytes(self, length: int) -> bytes:

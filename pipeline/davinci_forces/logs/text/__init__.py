@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -57,12 +57,11 @@ def read(path: Path, options: Options) -> Log:
 class TextLog(Log):
     """An opened text log."""
 
-    dialect: Dialect | None = None
+    dialect: Dialect = field(kw_only=True)
     encoding: str | None = None
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        assert self.dialect is not None
         for i, why in self.dialect.unread.items():
             if (name := self.dialect.channels[i].name) in names:
                 raise BadLog(f"{self.path}: column {i} ({name}) {why}")

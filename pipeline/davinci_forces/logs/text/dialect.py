@@ -5,18 +5,25 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from davinci_forces.logs.cells import MISSING
 from davinci_forces.logs.log import Channel, Options, renaming_remarks, unique
-from davinci_forces.logs.text.columns import counted_unit, kind_of, why_text
 from davinci_forces.logs.text.header import read_header
 from davinci_forces.logs.text.marks import find_marks
-from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclear, split_cells
-from davinci_forces.logs.text.stamps import Stamps, stamps_of
+from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclear, both_readings, split_cells
+from davinci_forces.logs.text.stamps import Stamps, both_dates, stamps_of
+from davinci_forces.maths.units import since_1970
 
 SAMPLE_LINES = 1000  # lines from which the format is found
 ABSENT = MISSING | {""}
 MAX_FOLDED = 4  # lines of a quoted name
 SEPARATOR_LINE = re.compile(r'"?sep=(.)"?\s*')  # the first line of files for Excel
+DAYS = ((36525, 73051), (730486, 767011))  # of the years 2000 to 2100, as Excel and MATLAB count them
+COUNTED_CELLS = 50  # from which a date as a count is recognised
+STEP_IN_DAYS = 2e-5  # a shorter sampling time is 1.7 s in days; in seconds, no robot samples so fast
+TICKS = ((1.25e17, 1.6e17), (6.3e17, 6.7e17))  # of 100 ns in the same years, as Windows and .NET count them
+MEASURED = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*[^\W\d_°%]+[^\d]*|[+-]?\d+(?:[.,]\d+)?\s*[°%]")
 
 
 @dataclass(frozen=True)
@@ -57,17 +64,17 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     if framed:
         lines, body = [FRAME.sub("", line) for line in lines], [FRAME.sub("", line) for line in body]
     columns = _columns(body, delimiter)
-    kinds = [kind_of(column, NUMBERS[decimal]) for column in columns]
+    kinds = [_kind_of(column, NUMBERS[decimal]) for column in columns]
     stamps = {i: s for i, column in enumerate(columns) if (s := stamps_of(column, kinds[i] == "text"))}
     first = _first_row(lines, delimiter, kinds, NUMBERS[decimal], stamps, options)
     if options.header is None and _are_numbers_of_columns(split_cells(lines[first], delimiter), columns, decimal):
         first, options = first + 1, replace(options, header=True)
-    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, len(kinds), options)
+    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, options)
     stamps = _from_first_row(stamps, [split_cells(line, delimiter) for line in lines[first:]], len(kinds))
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
-    unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := why_text(columns[i]))}
+    unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := _why_text(columns[i]))}
     unitless = [i for i, kind in enumerate(kinds) if kind == "number" and not header.units[i]]
-    counted = {i: unit for i in unitless if (unit := counted_unit(columns[i]))}
+    counted = {i: unit for i in unitless if (unit := _counted_unit(columns[i]))}
     units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
     described = zip(unique(header.names), units, kinds, header.aliases, strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
@@ -138,3 +145,44 @@ def _are_numbers_of_columns(cells: Sequence[str], columns: Sequence[Sequence[str
     numbers = [cell for cell in cells if cell]
     counts = any(numbers == [str(i + first) for i in range(len(numbers))] for first in (0, 1))
     return counts and len(numbers) > 2 and any(all(decimal in cell for cell in column) for column in columns)
+
+
+def _kind_of(cells: Sequence[str], number: re.Pattern[str]) -> str:
+    """The kind of a column: text if it has cells and none of them is a number."""
+    filled = [cell for cell in cells if cell and cell not in MISSING]
+    return "text" if filled and not any(map(number.fullmatch, filled)) else "number"
+
+
+def _counted_unit(cells: Sequence[str]) -> str:
+    """The unit of a column that counts since 1970 or an earlier day, if its numbers say so; else ""."""
+    try:
+        x = np.array([float(cell.replace(",", ".")) for cell in cells[:COUNTED_CELLS] if cell not in MISSING])
+    except ValueError:
+        return ""
+    if not len(x):
+        return ""
+    low, high = float(x.min()), float(x.max())
+    if (unit := since_1970(low)) not in ("", "s") and unit == since_1970(high):
+        return unit
+    if any(first < low and high < last for first, last in TICKS):
+        return "100 ns"
+    if len(x) < 3 or not any(first < low and high < last for first, last in DAYS):
+        return ""
+    steps = np.diff(x)
+    return "day" if np.all((steps > 0) & (steps < STEP_IN_DAYS)) else ""
+
+
+def _why_text(cells: Sequence[str]) -> str:
+    """Why a column of text is read neither as numbers nor as times, and what to export; "" for plain text."""
+    cell = next(cell for cell in cells if cell and cell not in MISSING)
+    if readings := both_dates(cells):
+        return readings
+    if readings := both_readings(cell):
+        return f"holds {cell!r}, which {readings}"
+    if any(number.fullmatch(cell) for number in NUMBERS.values()):
+        return f"holds {cell!r}, with another decimal mark than other columns; export all with one mark"
+    if re.search(r"\d:\d|\d[-./ ]\w+[-./ ]\d", cell):
+        return f"holds times such as {cell!r}, in a format that is not read; export seconds, or ISO 8601"
+    if MEASURED.fullmatch(cell):
+        return f"holds {cell!r}, a number and its unit in one cell; export the numbers alone"
+    return ""

@@ -22,17 +22,13 @@ class Header(NamedTuple):
     preamble: list[str]  # the other lines
 
 
-def read_header(
-    lines: Sequence[str], body: Sequence[Sequence[str]], delimiter: str, width: int, options: Options
-) -> Header:
-    """Read the lines before the first row; `body` are the cells of `width` columns.
+def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options) -> Header:
+    """Read the lines before the first row; `columns` are the cells of the columns below.
 
-    Raises
-    ------
-    Unclear
-        If the last line has other columns than the rows, or holds numbers and text.
+    Raises Unclear if the last line has other columns than the rows, or holds numbers and text.
     """
-    rows = [_fitted(line, body, delimiter, width) for line in lines]
+    width = len(columns)
+    rows = [_fitted(line, columns, delimiter) for line in lines]
     fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
     remarks = [i for i, line in enumerate(lines) if COMMENT.match(line) or RULER.fullmatch(line)]
     below = [i for i in range((fits or [-1])[-1] + 1, len(rows)) if i not in remarks]
@@ -69,14 +65,15 @@ def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
     return Header(stems, aliases, stated, preamble)
 
 
-def _fitted(line: str, body: Sequence[Sequence[str]], delimiter: str, width: int) -> list[str]:
+def _fitted(line: str, columns: Sequence[Sequence[str]], delimiter: str) -> list[str]:
     """Split a line of the header into as many cells as the rows have, if it has them with any delimiter."""
+    width = len(columns)
     text = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
     cells = split_cells(text, delimiter)
     if len(cells) == width + 1 and cells[-1] in ("", "Comment"):
         return cells[:-1]
-    if len(cells) == width - 1 and not all(columns := (any(body[0]), any(body[-1]))):
-        return [*cells, ""] if columns[0] else ["", *cells]  # rows end or begin in a delimiter
+    if len(cells) == width - 1 and not all(filled := (any(columns[0]), any(columns[-1]))):
+        return [*cells, ""] if filled[0] else ["", *cells]  # rows end or begin in a delimiter
     splits = ([cell.strip() for cell in re.split(pattern, text.strip())] for pattern in DELIMITERS)
     fitting = (split for split in splits if len(split) == width > 1 and all(split))
     return cells if '"' in text or (len(cells) == width and delimiter != " ") else next(fitting, cells)

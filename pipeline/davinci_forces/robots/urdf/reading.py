@@ -19,10 +19,11 @@ from davinci_forces.maths.mechanics.chain import FIXED
 from davinci_forces.maths.mechanics.placed import PlacedLink, assemble_chain
 from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
+from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
 from davinci_forces.robots.urdf import tables
 from davinci_forces.robots.urdf.tables import MOVING, TIP, Element, Notes, UrdfJoint, inertial_parameters, read_joint
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile
 
 DEFAULT_HARMONICS = 10  # of an unknown excitation: more than most excitations have, and too few to fit noise
 TIPS = (TIP, "tcp", "tool0", "ee_link")  # customary names of the frame at the tip
@@ -132,8 +133,6 @@ def _outwards(root: str, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
 
 def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]:
     """The independent joints from the base outwards, each with its name in logs and records."""
-    from davinci_forces.robots.from_toml import wrong_name
-
     called = dict[str, str]()
     for joint in ordered:
         if joint.kind == "fixed" or joint.mimic:

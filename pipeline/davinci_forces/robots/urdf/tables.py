@@ -21,8 +21,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.placed import transform
 from davinci_forces.robots.robot import MOST_LINKS
-from davinci_forces.toml import excerpt
-from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml import TomlFile, excerpt
 from davinci_forces.toml.ranges import unlikely
 
 MAX_BYTES = 4_000_000  # a description has a few thousand lines; shapes are in separate files
@@ -60,10 +59,7 @@ class Element:
 def read(file: Path) -> Element:
     """Read the outermost element of a file.
 
-    Raises
-    ------
-    BadRobot
-        If the file cannot be read, is not XML, or has a document type.
+    Raises BadRobot if the file cannot be read, is not XML, or has a document type.
     """
     try:
         text = read_bytes(file, MAX_BYTES, TOO_LARGE)

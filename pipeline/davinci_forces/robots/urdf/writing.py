@@ -28,10 +28,7 @@ FRAME_TOLERANCE = 1e-15  # largest rounding error of a frame that coincides with
 def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple[float, float]] | None = None) -> str:
     """The text of the robot's URDF, with remarks at its head, and viscous and Coulomb friction by coordinate.
 
-    Raises
-    ------
-    BadRobot
-        If the robot has no chain.
+    Raises BadRobot if the robot has no chain.
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")

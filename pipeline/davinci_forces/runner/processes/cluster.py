@@ -76,10 +76,8 @@ def require_terms(terms: Terms, folders: Folders) -> None:
 def connect(address: str, folders: Folders) -> Iterator[tuple[Executor, int, Terms]]:
     """Connect to a cluster; yield its executor, how many tasks it runs at once, and the terms for its workers.
 
-    Raises
-    ------
-    BadRequest
-        If no scheduler is at the address or it ends, workers are killed repeatedly, or Dask is not installed.
+    Raises BadRequest if no scheduler is at the address or it ends, workers are killed repeatedly, or Dask is not
+    installed.
     """
     try:
         from distributed import Client, KilledWorker, Security

@@ -111,10 +111,7 @@ class TaskQueue:
     def outcomes(self) -> Iterator[Outcome]:
         """Wait for the next outcomes: of one task that runs here, or of tasks that other processes have finished.
 
-        Raises
-        ------
-        BrokenExecutor
-            If other processes were killed too often.
+        Raises BrokenExecutor if other processes were killed too often.
         """
         if self._is_work_for_others():
             assert self.others is not None

@@ -45,12 +45,8 @@ IN_CONTROL = 0.9973  # share of values in control that keep the limits: three st
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
     """Write the page of these studies; return its files, and the studies that are left out without results.
 
-    Raises
-    ------
-    MissingRecord
-        If no study has results, or one has no summary.json.
-    BadRequest
-        If two studies have the same name, or the results of one cannot be read.
+    Raises MissingRecord if no study has results, or one has no summary.json; BadRequest if two studies have the same
+    name, or the results of one cannot be read.
     """
     folders = [runs.folders(study, None, reports).reports for study in studies]
     finished = [folder for folder in folders if (folder / "results.json").is_file()]

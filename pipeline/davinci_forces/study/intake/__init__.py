@@ -42,7 +42,7 @@ def touch_of(reading: "Intake", block: Block, t: Column, selected: Booleans) -> 
         role=reading.entry.role,
         sample=(reading.rows + np.arange(len(t)))[selected],
         push=_pushes(reading, block, len(t))[selected],
-        t=(t if reading.has_clock else unknown)[selected],
+        t=(t if reading.clocks.all_timed else unknown)[selected],
         **{name: column[selected] for name, column in columns.items()},
     )
 
@@ -87,22 +87,18 @@ class Intake:
         self.clocks = UsedClocks(
             self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
         )
-        if not self.has_clock and self.entry.needs_clock and not self.clocks.are_several:
+        if not self.clocks.all_timed and self.entry.needs_clock and not self.clocks.are_several:
             raise BadLog(
                 f"{self.log.path}: the log has no clock; name its time channel in [log.channels], "
                 "or give rate = ... [Hz]"
             )
-        if not self.has_clock and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)):
+        has_seconds = self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)
+        if not self.clocks.all_timed and has_seconds:
             raise BadLog(
                 f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
                 'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
             )
         self.names = list(dict.fromkeys([*used, *([self.clocks.time] if self.clocks.time else [])]))
-
-    @property
-    def has_clock(self) -> bool:
-        """Whether the times of the samples are known."""
-        return self.clocks.all_timed
 
     def unit(self, source: Source, channel: Channel) -> float:
         """The size of a channel's unit in SI: as the study gives it, else the log, else 1."""

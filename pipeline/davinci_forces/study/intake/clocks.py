@@ -181,10 +181,7 @@ class UsedClocks:
     def _since_1970(self, name: str, t: Array) -> float:
         """The size [s] of ms, us or ns if times since 1970 are in it, but taken as seconds; else 1.
 
-        Raises
-        ------
-        BadLog
-            If no unit of time gives a date, or the study or the log states the unit.
+        Raises BadLog if no unit of time gives a date, or the study or the log states the unit.
         """
         if name not in self.units and len(t):
             size = float(np.median(np.abs(t)))

@@ -32,7 +32,7 @@ def summary(intake: Intake) -> LogSummary:
     names = [channel.name for channel in log.channels]
     facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
-    rate, duration, jitter, longest_gap = times if intake.has_clock else (float("nan"),) * 4
+    rate, duration, jitter, longest_gap = times if intake.clocks.all_timed else (float("nan"),) * 4
     return LogSummary.like(
         clock,
         log=entry.name,
