@@ -117,7 +117,7 @@ def test_a_task_knows_nothing_of_other_logs(plan, stage):
 
 def test_a_stage_depends_on_the_settings_and_things_that_its_signature_names(plan):
     task = next(plan.tasks(declaration("predict")))
-    assert task.fingerprint.settings == {"lowpass": Settings().lowpass}
+    assert task.fingerprint.settings == {"fit": Settings().fit, "lowpass": Settings().lowpass}
     assert task.given.keys() == {"entry", "robot"} == task.fingerprint.given.keys()
 
 
