@@ -1,5 +1,6 @@
 """Every contact with its effort and error, against the detection level; and recordings that are not analysed."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -37,9 +38,9 @@ def section(context: Context) -> Iterator[Block]:
         yield peaks(contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
-            "Interval: 95 % confidence interval of the peak. Verdict: whether the peak exceeds the detection level; "
-            "“peak only” if it does but stays below the alarm level; “found” for a contact outside the windows that "
-            "the study states."
+            "Interval: 95 % confidence interval of the peak, not below that of the mean. Verdict: whether the peak "
+            "exceeds the detection level; “peak only” if it does but stays below the alarm level; “found” for a "
+            "contact outside the windows that the study states."
         )
         header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
         every = tuple(row for contact in contacts for row in rows(context, contact))
@@ -75,15 +76,18 @@ def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
         key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
         onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
         plain = peak if isinstance(peak, str) else replace(peak, std=None)  # as the interval has its error
-        yield (*run_cells(contact), onset, release, plain, interval(peak), mean, impulse, verdict(contact, i))
+        yield (*run_cells(contact), onset, release, plain, interval(peak, mean), mean, impulse, verdict(contact, i))
 
 
-def interval(peak: Number | str) -> str:
-    """The 95 % interval of a peak."""
+def interval(peak: Number | str, mean: Number | str) -> str:
+    """The 95 % interval of a peak, which is not smaller than that of the mean of the same sign."""
     if isinstance(peak, str) or peak.std is None or not peak.std > 0:
         return "–"
-    half = NORMAL_95 * peak.std
-    return " to ".join(Number(end, digits=3).text for end in (peak.value - half, peak.value + half))
+    sign, half = math.copysign(1.0, peak.value), NORMAL_95 * peak.std
+    least, most = abs(peak.value) - half, abs(peak.value) + half
+    if isinstance(mean, Number) and sign * mean.value > 0.0:
+        least = max(least, min(abs(mean.value) - NORMAL_95 * (mean.std or 0.0), most))
+    return " to ".join(Number(end, digits=3).text for end in sorted((sign * least, sign * most)))
 
 
 def verdict(contact: Contact, i: int) -> str:
