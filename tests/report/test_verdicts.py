@@ -86,6 +86,7 @@ def test_a_joint_whose_band_is_too_narrow_is_not_called_good_and_keeps_its_level
 )
 def test_a_band_is_right_where_it_covers_what_it_says(coverage, level, said):
     assert (band(coverage), band_in_words(coverage)) == (level, said)
+    assert band_in_words(coverage, 0.06) == (said if said != "too wide" else "wide enough")
 
 
 @pytest.mark.parametrize(("mean", "std", "named"), [(0.6, 0.0, False), (-0.8, 0.1, True), (0.8, 0.3, False)])

@@ -206,9 +206,12 @@ def band(coverage: float) -> Level:
     return "bad" if coverage < COVERED[0] else "info" if coverage > COVERED[1] else "good"
 
 
-def band_in_words(coverage: float) -> str:
-    """Whether a 95 % band that covers this share of free-space samples is too narrow, too wide or neither."""
-    return {"bad": "too narrow", "info": "too wide", "good": "wide enough"}[band(coverage)]
+def band_in_words(coverage: float, coverage_std: float = 0.0) -> str:
+    """Whether a 95 % band that covers this share of free-space samples is too narrow, surely too wide or neither."""
+    surely_wide = coverage - NORMAL_95 * coverage_std > 0.95
+    return {"bad": "too narrow", "info": "too wide" if surely_wide else "wide enough"}.get(
+        band(coverage), "wide enough"
+    )
 
 
 def percent(share: float) -> str:

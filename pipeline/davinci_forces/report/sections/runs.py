@@ -98,7 +98,7 @@ def scores(context: Context, tracks: list[Track]) -> Table:
 def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
     """The coverage of a run's band, also by quartile of speed, and whether this coverage is right."""
     spaces = context.catalogue.select(FreeSpace, log=t.log, joint=t.joint, filter=SMOOTHER)
-    words = band_in_words(spaces[0].coverage) if spaces else "–"
+    words = band_in_words(spaces[0].coverage, spaces[0].coverage_std) if spaces else "–"
     by_speed = ", ".join(map(percent, spaces[0].quartile_coverage)) if spaces else ""
     return context.number(f"effort.{t.log}.{t.joint}.coverage", 2), by_speed or "–", words
 

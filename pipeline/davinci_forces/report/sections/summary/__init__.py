@@ -254,7 +254,10 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     if with_sought:
         sought = trusted.sought
         row.append(context.size(space, "detection_level", sought, 3) if space is not None and sought else "–")
-    return *row, f"{percent(space.coverage)}, {band_in_words(space.coverage)}" if space is not None else "–"
+    return (
+        *row,
+        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–",
+    )
 
 
 def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
