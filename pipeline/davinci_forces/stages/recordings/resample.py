@@ -178,7 +178,7 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
         fault = (
             f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts? write the "
             f'unit of the channel in study.toml, as unit = "{units[:3]}", or the gear_ratio of a motor, or correct the '
-            "limits of the robot; convert arrays that belong to no study"
+            "limits of the robot; if you pass arrays, convert them"
         )
         if largest > IMPOSSIBLE:
             raise BadLog(fault)
