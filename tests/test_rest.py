@@ -67,7 +67,7 @@ def identified():
     means = average.run([signal], entry("identification"), arm.ARM, harmonics=0, lowpass=LOWPASS)
     [mean] = [r for r in means if isinstance(r, Average)]
     [own] = [r for r in differentiate.run(mean, JOINT, harmonics=0) if isinstance(r, Trajectory)]
-    records = list(fit.run([own], [arm.motion(signal)], arm.ARM, lowpass=LOWPASS, fit="chosen"))
+    records = list(fit.run([own], [arm.motion(signal)], arm.ARM, lowpass=LOWPASS))
     fits, [between] = ([r for r in records if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
     [model] = arm.models([signal], fits)
     [noise] = tune.gather(tune.run(model, between, lowpass=LOWPASS, delay=0.1), delay=0.1)
