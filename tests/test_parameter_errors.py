@@ -178,3 +178,21 @@ def test_a_parameter_is_compared_with_the_best_plain_model_and_with_models_that_
     compared = model_error.models_to_compare(parts["itself"], models)
     assert [name for part in compared for name in part.names] == ["plain, offset", "as well"]
     assert model_error.models_to_compare(parts["itself"], []) == []
+
+
+def test_parameters_that_no_data_separate_have_errors_that_a_ridge_does_not_hide():
+    """Two of three columns are alike but for rounding, as those of links beyond a joint that stands still."""
+    rng = np.random.default_rng(3)
+    Phi = rng.normal(size=(600, 1, 3))
+    Phi[:, 0, 2] = Phi[:, 0, 1] * (1.0 + 1e-7 * rng.normal(size=600))
+    tau = Phi @ [1.0, 2.0, 0.0] + rng.normal(0.0, 0.1, (600, 1))
+    equations = sum_equations(Phi, tau, np.arange(600) * PATH_BLOCKS // 600, PATH_BLOCKS)
+    model = IndependentJoint("one", (terms.inertia, terms.viscous, terms.stiffness), ("",) * 3)
+    library = Library(model, (), CellEquations(np.array([600]), equations, equations, equations))
+    part = CandidatePart(model, library, [0, 1, 2], Ridge(1e-3, np.ones(1), np.empty((0, 0))))
+    theta, noise = solve(sum_all(equations), part.ridge), np.full(3, 0.004)
+    std = np.sqrt(model_error.squares_of_ridge(part, theta, noise))
+    assert abs(theta[1] - 1.0) < 0.1  # the ridge divides it
+    assert std[0] < 0.02
+    assert (std[1:] > 1.0).all()
+    assert (model_error.squares_of_ridge(part.with_ridge(0.0), theta, noise) == 0.0).all()

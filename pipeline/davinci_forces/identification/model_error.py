@@ -13,7 +13,7 @@ effort.
 Blocks and models are two estimates of one square, so their mean is taken; it is at least 0.  s_i is the part of the
 difference that noise explains: the variance of an efficient estimate is that of another one less that of their
 difference (Hausman, 1978).  For white noise s_i^2 = s_noise^2 (C_i / C - 1), C the inverse of Phi' Phi.  A ridge moves
-parameters towards 0, and s_ridge^2 is the square of their change without it, less what noise explains.
+parameters towards 0.  s_ridge^2 is the square of their change without it, or what noise would add without it if more.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -41,6 +41,7 @@ from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
 MAX_WORSE = 2.0  # standard errors of the difference of scores, up to which a model predicts as well as the best
+TINY_RIDGE = 1e-12  # leaves columns that no data separate a finite, large variance
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
 
@@ -51,10 +52,19 @@ def model_std(part: CandidatePart, theta: Array, noise_std: Array, candidates: I
     shared = np.maximum((~np.isnan(changes)).sum(axis=0), 1)
     over_blocks = std_over_blocks(part, logs) ** 2 - noise_std**2
     by_model = (over_blocks + np.nansum(changes, axis=0) / shared) / 2.0
-    by_ridge = np.zeros(len(theta))
-    if part.ridge.strength > WEAK_RIDGE:
-        by_ridge = np.maximum(squared_changes(part, theta, noise_std, part.with_ridge(WEAK_RIDGE)), 0.0)
-    return np.asarray(np.sqrt(np.maximum(by_model, 0.0) + by_ridge))
+    return np.asarray(np.sqrt(np.maximum(by_model, 0.0) + squares_of_ridge(part, theta, noise_std)))
+
+
+def squares_of_ridge(part: CandidatePart, theta: Array, noise_std: Array) -> Array:
+    """Square the change of parameters (p,) without their ridge, or what noise would add without it if that is more.
+
+    Where no data separate columns, a ridge alone divides the effort between them.
+    """
+    if part.ridge.strength <= WEAK_RIDGE:
+        return np.zeros(len(theta))
+    free = solve(sum_all(part.by_block), part.with_ridge(WEAK_RIDGE).ridge)
+    ratio = unit_variance(part.with_ridge(TINY_RIDGE)) / unit_variance(part)
+    return np.maximum((free - theta) ** 2, noise_std**2 * (ratio - 1.0))
 
 
 def models_to_compare(

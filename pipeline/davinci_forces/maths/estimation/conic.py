@@ -194,7 +194,8 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
     z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, settings(TOLERANCE)).solve().x)
     miss = float(np.abs(F @ z - theta).max() / np.abs(theta).max())
     if not miss < MAX_GAP_SOLVER:
-        raise NotIdentifiable(f"no links were found that have these parameters: they miss them by {miss:.1e}")
+        why = f"no links were found that have these parameters: they miss them by {miss:.1e}"
+        raise NotIdentifiable(f"{why}; make joints that no log moves `fixed` in the robot's URDF, or move them")
     x = B @ np.where(mechanism.positive & ~links, np.maximum(z, 0.0), z)
     J = pseudo_inertias(x[links].reshape(L, TEN)) / np.outer(scale, scale)
     values, V = np.linalg.eigh(J)  # bodies at the edge of what is possible, or by the solver's errors beyond it
