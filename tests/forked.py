@@ -11,7 +11,19 @@ from pathlib import Path
 
 from davinci_forces.runner.processes import workers
 
+# What the package loads when it needs it, and what else a run of all stages loads.
+LATER = ("matplotlib.figure", "pandas", "pydantic", "scipy.signal", "scipy.stats", "statsmodels.api", "typst")
 NO_CONSTANTS: Mapping[str, float] = {}
+
+
+def prepare() -> None:
+    """Start the process that others are forked from, if the system can, with all loaded that a run loads later."""
+    if workers.METHOD == "forkserver":
+        from multiprocessing import forkserver
+
+        forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded", *LATER])
+        forkserver.ensure_running()
+    workers.prepare()
 
 
 def run(
@@ -21,7 +33,7 @@ def run(
 
     `constants` are values of constants of modules, which hold in that process alone.
     """
-    workers.prepare()
+    prepare()
     with tempfile.NamedTemporaryFile() as output:
         started = (list(words), folder, output.name, dict(environment), dict(constants))
         process = get_context(workers.METHOD).Process(target=_perform, args=started)
