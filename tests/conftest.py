@@ -33,6 +33,12 @@ BESIDE = ROOT.parent / "shared" / "data"
 BENCHMARKS = HERE / "benchmarks"
 # An arm whose friction the models describe (`matched`), and the same arm with another friction (`realistic`).
 TWO_FRICTIONS = str(HERE / "simulation" / "two-frictions.toml")
+# A coarser design of a robot: one start of each search of an excitation, and larger tolerances of simulated control.
+QUICK_DESIGN = {
+    "davinci_forces.stages.design.STARTS": 1,
+    "davinci_forces.maths.simulation.continuous.RELATIVE": 1e-4,
+    "davinci_forces.maths.simulation.continuous.ABSOLUTE": 1e-6,
+}
 
 # Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
 # itself, with `@pytest.mark.medium`.
@@ -427,6 +433,15 @@ def typeset_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(typst, "compile_with_warnings", remembered)
+        yield
+
+
+@pytest.fixture(scope="module")
+def quick_design() -> Iterator[None]:
+    """A coarser design of the robot, for tests on logs, which it does not depend on."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in QUICK_DESIGN.items():
+            patch.setattr(name, value)
         yield
 
 

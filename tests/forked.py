@@ -5,24 +5,46 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
 from davinci_forces.runner.processes import workers
 
+# What the package loads when it needs it, and what else a run of all stages loads.
+LATER = ("matplotlib.figure", "pandas", "pydantic", "scipy.signal", "scipy.stats", "statsmodels.api", "typst")
+NO_CONSTANTS: Mapping[str, float] = {}
 
-def run(words: Sequence[str], folder: Path, environment: Mapping[str, str]) -> tuple[int | None, str]:
-    """The exit code and the output of `davinci-forces` with words, or of `python -c` code, in a folder."""
+
+def prepare() -> None:
+    """Start the process that others are forked from, if the system can, with all loaded that a run loads later."""
+    if workers.METHOD == "forkserver":
+        from multiprocessing import forkserver
+
+        forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded", *LATER])
+        forkserver.ensure_running()
     workers.prepare()
+
+
+def run(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], constants: Mapping[str, float] = NO_CONSTANTS
+) -> tuple[int | None, str]:
+    """The exit code and the output of `davinci-forces` with words, or of `python -c` code, in a folder.
+
+    `constants` are values of constants of modules, which hold in that process alone.
+    """
+    prepare()
     with tempfile.NamedTemporaryFile() as output:
-        started = (list(words), folder, output.name, dict(environment))
+        started = (list(words), folder, output.name, dict(environment), dict(constants))
         process = get_context(workers.METHOD).Process(target=_perform, args=started)
         process.start()
         process.join()
         return process.exitcode, Path(output.name).read_text()
 
 
-def _perform(words: list[str], folder: Path, output: str, environment: dict[str, str]) -> None:
+def _perform(
+    words: list[str], folder: Path, output: str, environment: dict[str, str], constants: dict[str, float]
+) -> None:
     with open(output, "ab") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
@@ -31,6 +53,10 @@ def _perform(words: list[str], folder: Path, output: str, environment: dict[str,
     os.chdir(folder)
     code: object = 1
     try:
+        for name, value in constants.items():
+            module, _, constant = name.rpartition(".")
+            assert hasattr(import_module(module), constant), name
+            setattr(import_module(module), constant, value)
         if words[:2] == ["python", "-c"]:
             exec(compile(words[2], "<string>", "exec"), {"__name__": "__main__"})
         else:

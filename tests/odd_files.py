@@ -20,13 +20,13 @@ from pathlib import Path
 from pkgutil import walk_packages
 
 from davinci_forces import files
+from tests.forked import LATER
 
 SECONDS = 60  # of the clock, after which a child is ended: it waits for what never comes
 MEMORY = 4 << 30  # [bytes] of addresses that a child may have
 # Bytes of a file without content: of what is read piece by piece, of results, and of all else.
 HUGE, BEYOND = {".csv": 1 << 25, ".json": files.MAX_BYTES + 1}, 1 << 29
 KINDS = ("pipe", "device", "folder", "socket", "nowhere", "huge", "link")
-LATER = ("matplotlib.figure", "pandas", "pydantic", "scipy.signal", "statsmodels.api", "typst")  # loaded when needed
 FELT = {"title": "Felt", "tissue_stiffness": 1.0, "response": [], "hands": {}}
 PAGES = {"report.html": b"<html>", "report.pdf": b"%PDF"}
 MORE = '\nhaptics = "feel.toml"\nbaseline = "old.json"\n'

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 import davinci_forces
 from davinci_forces.errors import BadLog
+from davinci_forces.identification import search
 from davinci_forces.records import Diagnostic, Recording
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.stages.recordings import resample
@@ -198,6 +199,15 @@ def arms() -> list[tuple[bool, str]]:
     return [(i % 2 == 0, name) for i, name in enumerate(LOGS)] + [(i % 2 == 1, name) for i, name in enumerate(FIRST)]
 
 
+@pytest.fixture
+def coarse_search(monkeypatch):
+    """The first, the middle and the last of each grid that a model is searched on, so that every extreme is tried."""
+    for name in ("CUTOFF_GRID", "LAG_GRID", "RIDGE_GRID", "DISPLACEMENT_GRID", "WIDTH_GRID", "DECAY_VELOCITY_GRID"):
+        grid = getattr(search, name)
+        monkeypatch.setattr(search, name, (grid[0], grid[len(grid) // 2], grid[-1]))
+
+
+@pytest.mark.usefixtures("coarse_search")
 @pytest.mark.parametrize(("velocity", "name"), arms())
 def test_no_log_however_impossible_ends_in_a_bug(tmp_path, name, velocity):
     """Identification, validation and contact are all spoilt, in an arm with or without limits and velocities."""

@@ -109,14 +109,16 @@ def test_a_dry_run_says_what_would_run_and_why_and_changes_nothing(study, finish
 
 
 def test_a_run_ends_with_the_answer_the_times_and_where_it_is(finished):
-    said = call("all", finished, "--force")
+    edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
+    (processed(finished) / "tasks" / "design" / "design.json").unlink()
+    said = call("all", finished)
     answer = (reports(finished) / "summary.txt").read_text()
     assert answer in said
     assert answer.startswith("joint")
     assert re.search(r"^took \d+\.\d s: ", said[said.index(answer) :], re.M)
     for file in ("report.html", "report.pdf", "results.json"):
         assert str(reports(finished) / file) in said
-    assert "design: design" not in said
+    assert "\ndesign: it has not run yet\n" in f"\n{said}"
 
 
 def test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes(study, analysed):
@@ -151,8 +153,8 @@ def test_a_stage_runs_again_and_says_why(finished, change, reruns, keeps):
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new, 1))
-    lines = stages(finished).splitlines()
     stage, why = reruns
+    lines = stages(finished, names=(*([keeps] if keeps else []), stage)).splitlines()
     assert any(line.startswith(f"{stage}:") and why in line for line in lines), lines
     if keeps:
         assert any(line.startswith(f"{keeps}:") and line.endswith("up to date") for line in lines), lines

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import JointModel, Track, store
 from tests import arm
 from tests.benchmarks.reading import Report
@@ -29,6 +30,8 @@ MEASURED = """
 import sys
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
+from davinci_forces.maths import arrays
+arrays.BLOCK_SAMPLES = int(sys.argv.pop(1))  # before others import it
 from davinci_forces.logs.isolated import process
 import davinci_forces
 from davinci_forces.commands.inspect import describe
@@ -126,22 +129,25 @@ def test_the_stages_of_a_long_log_take_little_more_memory_than_it_does(tmp_path:
     assert shown < LIBRARIES + TIMES * numbers
 
 
-def hour_study(home: Path, minutes: int) -> Path:
-    """A study of one joint at a kilohertz: a minute to fit, one to validate, and a contact log of these minutes."""
+def hour_study(home: Path, minutes: int, share: float = 1.0) -> Path:
+    """A study of one joint at a kilohertz: a minute to fit, one to validate, and a contact log of these minutes.
+
+    Or this share of a minute, at a pace that is faster by as much.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     folder, joint = home / "raw" / "lab", "hand_roll"
     folder.mkdir(parents=True)
-    windows = [[60.0 * i + 4.0, 60.0 * i + 6.0] for i in range(10)]
+    windows = [[60.0 * i + 4.0, 60.0 * i + 6.0] for i in range(min(10, minutes))]
 
     def push(t: np.ndarray) -> np.ndarray:
         return np.where((t % 60.0 > 4.0) & (t % 60.0 < 6.0) & (t < 600.0), 1.0, 0.0)
 
     tables = []
     for seed, (name, role, period, seconds, external, more) in enumerate((
-        ("ident", "identification", 10.0, 60, None, "period = 10.0"),
-        ("check", "validation", 13.0, 65, None, ""),
+        ("ident", "identification", 10.0 * share, 60 * share, None, f"period = {10.0 * share}"),
+        ("check", "validation", 13.0 * share, 65 * share, None, ""),
         ("push", "contact", 13.0, 60 * minutes, push, f"contact = {windows}"),
     )):  # fmt: skip
         signal = arm.signal(joint, seed, periods=seconds / period, rate=1000.0, period=period, external=external)
@@ -165,10 +171,11 @@ def test_an_hour_at_a_kilohertz_goes_through_all_stages(tmp_path: Path, full: bo
     assert max(own, child) < MOST_OF_ALL
 
 
-def peak(how: str, what: Path, *stages: str) -> tuple[float, float]:
-    """The most memory [MB] that a process takes for it, and the largest of its children."""
+def peak(how: str, what: Path, *stages: str, block: int = BLOCK_SAMPLES) -> tuple[float, float]:
+    """The most memory [MB] that a process takes for it, in blocks of so many samples, and a child of it."""
+    words = [how, str(what), *stages]
     done = subprocess.run(
-        [sys.executable, "-c", MEASURED, how, what, *stages], capture_output=True, text=True, check=True
+        [sys.executable, "-c", MEASURED, str(block), *words], capture_output=True, text=True, check=True
     )
     own, child = map(float, done.stdout.splitlines()[-1].split())
     return own, child

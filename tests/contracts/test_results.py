@@ -1,6 +1,8 @@
 """Every number of results.json has a standard error, or says why it has none."""
 
+import json
 import math
+from dataclasses import asdict
 from fnmatch import fnmatch
 
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from davinci_forces.records import KINDS
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.record import Published
-from davinci_forces.report.results import REASONS, TOO_FEW, Results, collect
+from davinci_forces.report.results import REASONS, TOO_FEW, Result, Results, collect
 
 WORDS = {"exact", "stated", "count", "simulated truth", "p-value", "setting", "standard deviation"}
 WITH_STD = {  # what a referee asks the uncertainty of, by the words of the issue
@@ -60,3 +62,10 @@ def test_what_is_measured_has_a_standard_error(family: str, published: dict[str,
 def test_few_numbers_of_a_whole_study_have_too_few_data(results: Results):
     few = [key for key, result in results.items() if result.std_reason == TOO_FEW]
     assert len(few) < 0.02 * len(results), few
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_the_file_of_numbers_is_laid_out_as_json_with_an_indent(count):
+    numbers = [Result(f'a "{i}" é', 0.1 * i, None if i else 0.5, "N m", "raw/truth.toml#[]", "0") for i in range(count)]
+    expected = json.dumps([asdict(number) for number in numbers], indent=1, ensure_ascii=False) + "\n"
+    assert Results({number.key: number for number in numbers}).json() == expected.encode()

@@ -107,7 +107,7 @@ def test_the_penalty_of_combinations_is_that_of_the_smallest_parts_they_can_have
     G = np.cov(RNG.normal(size=(3, 50)))
     beta, D = RNG.normal(size=3), ((G @ K) * K).sum(axis=0)
     smallest, *_ = np.linalg.lstsq(K / np.sqrt(D), beta)  # of least sum D pi^2 among all pi with K pi = beta
-    assert beta @ penalty(G, K) @ beta == pytest.approx(smallest @ smallest, rel=1e-9)
+    assert beta @ penalty(G[None], K)[0] @ beta == pytest.approx(smallest @ smallest, rel=1e-9)
 
 
 def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():

@@ -21,8 +21,23 @@ LOGS = r'name = "(slide-excitation|tissue-approach|tissue-haptic)"'
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
-    """The tissue of every seed: the logs of the slide, simulated anew and analysed."""
+def _moved_once():
+    """Each log's motion is simulated once, since a seed is that of the noise alone."""
+    simulate_log, runs = study_folder.simulate_log, {}
+
+    def remembered(scenario, log):
+        if log.name not in runs:
+            runs[log.name] = simulate_log(scenario, log)
+        return runs[log.name]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study_folder, "simulate_log", remembered)
+        yield
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory, _moved_once):
+    """The tissue of every seed: the logs of the slide, recorded anew and analysed."""
     text = Path(TWO_FRICTIONS).read_text()
     head, *logs = re.split(r"(?m)^\[\[log\]\]\n", text)
     kept = head + "".join(f"[[log]]\n{log}" for log in logs if re.match(LOGS, log))

@@ -67,6 +67,7 @@ def test_a_file_of_probes_needs_no_clock(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quick_design")
 def test_the_report_of_a_user_s_probes_states_the_stiffness_without_the_thesis(tmp_path):
     folder = study(tmp_path)
     stages(folder, "ingest", "palpate", "report")

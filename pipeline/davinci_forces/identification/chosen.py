@@ -167,7 +167,7 @@ def parameters(
                 theta_std_model=model,
                 theta_std=np.hypot(noise, model),
                 samples=int(samples.max()),
-                condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
+                condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
                 **scores(part, theta),
             ),
         )
@@ -210,7 +210,7 @@ def factor(equations: Equations, ridge: Ridge) -> Triangle:
 
     U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
     """
-    scaled, size = scaled_equations(equations, ridge)
+    [scaled], [size] = scaled_equations(equations, ridge)
     U = np.asarray(np.linalg.cholesky(scaled).T, np.float64)
     y = np.linalg.solve(U.T, ridge.weights @ equations.right[0] / size)
     return Triangle(U, y, max(float(ridge.weights @ equations.squares[0] - y @ y), 0.0), size)

@@ -34,6 +34,7 @@ from davinci_forces.maths.selection import (
     covariance,
     schemes_of,
     solve,
+    solve_each,
     standard_error,
     sum_all,
 )
@@ -126,7 +127,7 @@ def std_over_periods(part: CandidatePart, logs: int) -> Array:
 def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:
     """Jackknife the standard errors (p,) of parameters over groups of cells, by their number (C,)."""
     groups = [number == n for n in np.unique(number) if cells.squares[number == n].any()]
-    return of_left_out(np.array([solve(cells.sum_cells(~out), ridge) for out in groups]))
+    return of_left_out(solve_each(cells.sum_groups(~out for out in groups), ridge))
 
 
 def other_models(

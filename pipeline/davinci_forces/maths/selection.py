@@ -18,7 +18,7 @@ Normal equations are summed by cells of the data, so that a fit without some of 
     G = sum Phi' Phi,    r = sum Phi' tau,    s = sum tau^2,    |tau - Phi theta|^2 = s - 2 r' theta + theta' G theta
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,12 +42,17 @@ class Equations(NamedTuple):
 
     def sum_cells(self, cells: Booleans) -> "Equations":
         """Sum the equations of these cells (C,)."""
-        return Equations(*(part[cells].sum(axis=0, keepdims=True) for part in self))
+        return self.sum_groups([cells])
+
+    def sum_groups(self, groups: Iterable[Booleans]) -> "Equations":
+        """Sum the equations of the cells (C,) of each of G groups, as G cells."""
+        cells = list(groups)
+        return Equations(*(np.stack([part[group].sum(axis=0) for group in cells]) for part in self))
 
     def errors(self, theta: Array) -> Array:
-        """Squared errors |tau - Phi theta|^2 (C, m) of parameters (p,)."""
-        product = np.einsum("cmpq,p,q->cm", self.gram, theta, theta)
-        return np.asarray(np.maximum(self.squares - 2.0 * self.right @ theta + product, 0.0))
+        """Squared errors |tau - Phi theta|^2 (C, m) of parameters (p,), or of those of each cell (C, p)."""
+        product = np.einsum("...mpq,...p,...q->...m", self.gram, theta, theta)
+        return np.asarray(np.maximum(self.squares - 2.0 * (self.right @ theta[..., None])[..., 0] + product, 0.0))
 
     def columns(self, which: Sequence[int] | Integers) -> "Equations":
         """The equations of some of the parameters."""
@@ -99,21 +104,27 @@ def solve(equations: Equations, ridge: Ridge) -> Array:
 
     Raises LinAlgError if the columns are linearly dependent and there is no ridge.
     """
+    return np.asarray(solve_each(equations, ridge)[0])
+
+
+def solve_each(equations: Equations, ridge: Ridge) -> Array:
+    """Solve the equations of each cell for its parameters (C, p); raises as `solve` does."""
     scaled, size = scaled_equations(equations, ridge)
-    return np.asarray(np.linalg.solve(scaled, ridge.weights @ equations.right[0] / size) / size)
+    right = ridge.weights @ equations.right / size
+    return np.asarray(np.linalg.solve(scaled, right[..., None])[..., 0] / size)
 
 
 def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
-    """G + lambda P (p, p) of columns scaled to unit length, and their lengths (p,); raises as `solve` does."""
-    G = np.einsum("m,mpq->pq", ridge.weights, equations.gram[0])
-    size = np.sqrt(np.diag(G))
+    """G + lambda P (C, p, p) of columns scaled to unit length, and their lengths (C, p); raises as `solve` does."""
+    G = np.einsum("m,cmpq->cpq", ridge.weights, equations.gram)
+    size = np.sqrt(np.einsum("cpp->cp", G))
     # After scaling, a column of rounding errors would look like any other column to the ridge.  If a joint stands
     # still, some base parameters of an arm have a column of zeros, which does not affect the others.
-    least = 0.0 if len(ridge.combination) else ROUNDING_OF_COLUMN * size.max()
+    least = 0.0 if len(ridge.combination) else ROUNDING_OF_COLUMN * size.max(axis=1, keepdims=True)
     if not (size > least).all():
         raise np.linalg.LinAlgError("a column is zero throughout")
-    scaled = (G + ridge.strength * penalty(G, ridge.combination)) / size / size[:, None]
-    if ridge.strength == 0.0 and np.linalg.cond(scaled) > DEPENDENT:
+    scaled = (G + ridge.strength * penalty(G, ridge.combination)) / size[:, None] / size[:, :, None]
+    if ridge.strength == 0.0 and (np.linalg.cond(scaled) > DEPENDENT).any():
         raise np.linalg.LinAlgError("the columns are linearly dependent")
     return scaled, size
 
@@ -123,7 +134,7 @@ def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
 
     Raises LinAlgError if rounding makes a variance negative.
     """
-    scaled, size = scaled_equations(equations, ridge)
+    [scaled], [size] = scaled_equations(equations, ridge)
     inverse = np.linalg.inv(scaled) / size / size[:, None]
     result = np.asarray(inverse @ np.einsum("m,mpq->pq", ridge.weights**2 * variances, equations.gram[0]) @ inverse)
     if np.diag(result).min() < 0.0:
@@ -132,27 +143,26 @@ def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
 
 
 def penalty(G: Array, combination: Array) -> Array:
-    """Penalty P (p, p): the square of each parameter's column; for base parameters, that of the smallest pi."""
-    P, b = np.diag(np.diag(G)), len(combination)
+    """Penalty P (C, p, p): the square of each parameter's column; for base parameters, that of the smallest pi."""
+    P, b = np.where(np.eye(G.shape[-1], dtype=np.bool_), G, 0.0), len(combination)
     if b:
         D = size_of_links(G, combination)
-        excited = UNSEEN * D.max() < D
-        K = combination[:, excited]
-        P[:b, :b] = np.linalg.inv((K / D[excited]) @ K.T)
+        share = np.divide(1.0, D, out=np.zeros_like(D), where=UNSEEN * D.max(axis=1, keepdims=True) < D)
+        P[:, :b, :b] = np.linalg.inv((combination * share[:, None]) @ combination.T)
     return P
 
 
 def size_of_links(G: Array, combination: Array) -> Array:
-    """Squared lengths D (10 L + ...) of the columns of the parameters pi that base parameters combine."""
+    """Squared lengths D (C, 10 L + ...) of the columns of the parameters pi that base parameters combine."""
     b = len(combination)
-    return np.asarray(((G[:b, :b] @ combination) * combination).sum(axis=0))
+    return np.asarray(((G[:, :b, :b] @ combination) * combination).sum(axis=1))
 
 
 def excited_parameters(equations: Equations, ridge: Ridge) -> int:
     """The number of base parameters that the data of one cell excite; without them the penalty does not exist."""
     if not len(ridge.combination):
         return 0
-    D = size_of_links(np.einsum("m,mpq->pq", ridge.weights, equations.gram[0]), ridge.combination)
+    [D] = size_of_links(np.einsum("m,cmpq->cpq", ridge.weights, equations.gram), ridge.combination)
     return int(np.linalg.matrix_rank(ridge.combination[:, UNSEEN * D.max() < D]))
 
 
@@ -215,7 +225,7 @@ class LeftOut:
     def __init__(self, equations: Equations, schemes: Sequence[Booleans], scored: Equations | None = None) -> None:
         self.all, scored = sum_all(equations), scored or equations
         self.squares = scored.squares.sum(axis=0)
-        self.schemes = [[(equations.sum_cells(~out), scored.sum_cells(out)) for out in groups] for groups in schemes]
+        self.schemes = [(equations.sum_groups(~groups), scored.sum_groups(groups)) for groups in schemes]
 
     def cross_validate(self, ridge: Ridge) -> CrossValidation:
         """Cross-validate a candidate: leave out each group of cells in turn, and predict it.
@@ -223,9 +233,9 @@ class LeftOut:
         Raises LinAlgError if the columns of the other cells are linearly dependent.
         """
         unseen, fitted, of_all = [], [], solve(self.all, ridge)
-        for groups in self.schemes:
-            unseen.append(np.array([group.errors(solve(kept, ridge))[0] for kept, group in groups]) / self.squares)
-            fitted.append(np.array([group.errors(of_all)[0] for _, group in groups]) / self.squares)
+        for kept, groups in self.schemes:
+            unseen.append(groups.errors(solve_each(kept, ridge)) / self.squares)
+            fitted.append(groups.errors(of_all) / self.squares)
         return CrossValidation(tuple(unseen), tuple(fitted))
 
 
@@ -241,9 +251,8 @@ def standard_error(candidate: CrossValidation, reference: CrossValidation | None
     for i, shares in enumerate(candidate.unseen):
         values = [shares, *([reference.unseen[i]] if reference else [])]
         G = len(shares)
-        scores = np.array([
-            [np.sqrt(np.delete(x, g, axis=0).sum(axis=0) * G / (G - 1)).mean() for g in range(G)] for x in values
-        ])  # fmt: skip
+        others = (1.0 - np.eye(G)) * G / (G - 1)
+        scores = [np.sqrt(others @ x).mean(axis=1) for x in values]
         differences = scores[0] - scores[1] if reference else scores[0]
         variances.append((G - 1) / G * float(((differences - differences.mean()) ** 2).sum()))
     return float(np.sqrt(np.mean(variances)))

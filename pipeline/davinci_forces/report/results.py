@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import re
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from fnmatch import translate
 
 from davinci_forces.records import KINDS, Record
@@ -89,9 +89,11 @@ class Results(dict[str, Result]):
         self[key] = Result(key, value, None, unit, f"raw/truth.toml#{json.dumps(path, ensure_ascii=False)}", sha256)
 
     def json(self) -> bytes:
-        """The content of results.json."""
-        text = json.dumps([asdict(result) for result in self.values()], indent=1, ensure_ascii=False, allow_nan=False)
-        return (text + "\n").encode()
+        """The content of results.json, a line for each field."""
+        # Each number by itself, as `indent` takes an encoder that is four times as slow.
+        encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",\n  ", ": "))
+        numbers = (f" {{\n  {encoder.encode(vars(result))[1:-1]}\n }}" for result in self.values())
+        return ("[\n" + ",\n".join(numbers) + "\n]\n" if self else "[]\n").encode()
 
 
 def collect(catalogue: Catalogue) -> Results:

@@ -9,6 +9,7 @@ frequency.  For white noise all ordinates have the same exponential distribution
 """
 
 from collections.abc import Sequence
+from functools import cache
 from math import factorial
 from typing import NamedTuple
 
@@ -88,6 +89,7 @@ def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     return Cumulative(frequency, share, distance, float(kstwo.sf(distance, q - 1)))
 
 
+@cache  # signals of one log have as many, and each takes milliseconds
 def distance_of(probability: float, ordinates: int) -> float:
     """Half-width of the band that a cumulative periodogram of white noise exceeds with this probability."""
     from scipy.stats import kstwo

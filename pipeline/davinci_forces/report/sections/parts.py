@@ -129,13 +129,13 @@ def normal_plot(title: str, x: Column, axis: str) -> Panel:
 
     At most 500 points, evenly spread over the order, as more cannot be told apart on paper.
     """
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     ordered = np.sort(x)
-    scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
+    scores = ndtri((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
     shown = evenly(len(x), 500)
     low, high = np.quantile(x, [0.25, 0.75])
-    slope = (high - low) / (2 * norm.ppf(0.75))
+    slope = (high - low) / (2 * ndtri(0.75))
     line = Reference(float(slope), float((low + high) / 2), "normal", "vermillion")
     return Panel(title, "normal quantile", axis, (Points(scores[shown], ordered[shown], "", "blue"), line))
 
