@@ -118,7 +118,7 @@ def test_a_run_ends_with_the_answer_the_times_and_where_it_is(finished):
     assert re.search(r"^took \d+\.\d s: ", said[said.index(answer) :], re.M)
     for file in ("report.html", "report.pdf", "results.json"):
         assert str(reports(finished) / file) in said
-    assert "\ndesign: it has not run yet\n" in f"\n{said}"
+    assert "\ndesign: first run\n" in f"\n{said}"
 
 
 def test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes(study, analysed):
