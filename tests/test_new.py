@@ -200,6 +200,16 @@ def test_a_robot_file_outside_the_study_is_refused_at_once(tmp_path):
     assert [path.name for path in file.parent.iterdir()] == ["run.csv"]
 
 
+def test_a_robot_file_of_the_study_may_be_named_from_the_current_folder(tmp_path):
+    t, q, dq = motion(2)
+    file = table(tmp_path / "mine" / "run.csv", t, q, dq, effort(q, dq))
+    new(file)
+    (file.parent / "study.toml").unlink()
+    robot = (file.parent / "robot.toml").rename(file.parent / "arm.toml")
+    call("new", file, "--robot", robot)
+    assert 'robot = "arm.toml"' in (file.parent / "study.toml").read_text()
+
+
 def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
     made = {}
     for seed, (name, repeats) in enumerate({"a": True, "b": False, "c_noweight": True, "d_205g": True}.items()):

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -104,6 +105,9 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
             raise BadRequest(f"{file} lies outside {folder}; copy it there first, as a study holds its own logs")
     if not files:
         raise BadRequest(f"{folder} holds no logs")
+    if robot_name.endswith(robots.FILES) and Path(robot_name).is_file():  # named from the current folder
+        with suppress(ValueError):
+            robot_name = Path(robot_name).absolute().relative_to(folder.absolute()).as_posix()
     if robot_name.endswith(robots.FILES) and not (is_inside(robot_name) and (folder / robot_name).exists()):
         raise BadRequest(
             f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"

@@ -46,8 +46,9 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     yield Prose(
         "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
         "from the external efforts of the three joints, at times when all of them move. Two assumptions are "
-        "made: nothing but the tip is touched, and the wrist is straight. The efforts are those of the smoother, which "
-        "has no delay. Their covariance $C_tau$ contains the squares of their standard deviations."
+        "made: nothing but the tip is touched, and joints beyond these three stand at zero, as in a straight wrist. "
+        "The efforts are those of the smoother, which has no delay. Their covariance $C_tau$ contains the squares of "
+        "their standard deviations."
     )
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
