@@ -437,8 +437,8 @@ def test_the_pdf_prints_the_contacts_that_are_largest_beside_their_joints_level(
 
 
 def test_the_interval_of_a_peak_is_95_percent():
-    assert interval(Number(-2.0, "N", std=0.1)) == "−2.20 to −1.80"
-    assert interval(Number(-2.0, "N")) == interval("–") == "–"
+    assert interval(Number(-2.0, "N", std=0.1), "–") == "−2.20 to −1.80"
+    assert interval(Number(-2.0, "N"), "–") == interval("–", "–") == "–"
 
 
 @pytest.mark.parametrize(("dip", "contacts"), [(0.8, 1), (0.1, 2), (-1.0, 3)])

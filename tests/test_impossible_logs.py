@@ -333,7 +333,9 @@ def test_degrees_are_remarked_on_where_a_joint_states_no_limits_and_never_refuse
     monkeypatch.setattr(arm, "ARM", boundless)
     assert resampled(scaled(q=1.0), velocity="derived") == []
     (text,) = resampled(scaled(q=DEG), velocity="derived")
-    assert re.search(r"positions reach .* rad, .* times the limit of 6\.28 rad, which is assumed.*convert arrays", text)
+    assert re.search(
+        r"positions reach .* rad, .* times the limit of 6\.28 rad, which is assumed.*if you pass arrays, convert", text
+    )
 
 
 def test_an_effort_that_never_changes_is_named_with_its_value():

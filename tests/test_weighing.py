@@ -42,16 +42,16 @@ HUNG = AttachedMass("hand_pitch", (0.0, -0.1, 0.5), MASS)
 @pytest.fixture(scope="module", autouse=True)
 def _periods_found_once():
     """The period of each motion is searched once: studies of other seeds differ in their efforts alone."""
-    guess, known = weigh.guess, {}
+    repetition, known = weigh.repetition, {}
 
-    def remembered(signals):
-        key = tuple(signal.tobytes() for signal in signals)
+    def remembered(positions):
+        key = tuple(x.tobytes() for x in positions)
         if key not in known:
-            known[key] = guess(signals)
+            known[key] = repetition(positions)
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(weigh, "guess", remembered)
+        patch.setattr(weigh, "repetition", remembered)
         yield
 
 

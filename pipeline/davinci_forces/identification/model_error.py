@@ -32,6 +32,7 @@ from davinci_forces.maths.selection import (
     LeftOut,
     Ridge,
     covariance,
+    scaled_equations,
     schemes_of,
     solve,
     solve_each,
@@ -42,7 +43,7 @@ from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
 MAX_WORSE = 2.0  # standard errors of the difference of scores, up to which a model predicts as well as the best
-TINY_RIDGE = 1e-12  # leaves columns that no data separate a finite, large variance
+SMALLEST_SQUARE = 1e-12  # squared length of a combination of scaled columns, below which it is rounding
 WEAK_RIDGE = 1e-6  # divides effort equally between columns that no data separate, and changes no others
 
 
@@ -64,8 +65,11 @@ def squares_of_ridge(part: CandidatePart, theta: Array, noise_std: Array) -> Arr
     if part.ridge.strength <= WEAK_RIDGE:
         return np.zeros(len(theta))
     free = solve(sum_all(part.by_block), part.with_ridge(WEAK_RIDGE).ridge)
-    ratio = unit_variance(part.with_ridge(TINY_RIDGE)) / unit_variance(part)
-    return np.maximum((free - theta) ** 2, noise_std**2 * (ratio - 1.0))
+    [scaled], [size] = scaled_equations(sum_all(part.by_block), part.with_ridge(SMALLEST_SQUARE).ridge)
+    squares, directions = np.linalg.eigh(scaled)
+    free_variance = (directions**2 / np.maximum(squares, SMALLEST_SQUARE)).sum(axis=1) / size**2
+    by_noise = noise_std**2 * (free_variance / unit_variance(part) - 1.0)
+    return np.asarray(np.maximum((free - theta) ** 2, by_noise))
 
 
 def models_to_compare(

@@ -11,8 +11,7 @@ from davinci_forces.study.guessing import Holding
 
 # Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.
 WORDS = {
-    "free": r"(no|without) (weight|load|mass|contact|touch)|noweight|noload|nomass|nocontact|unloaded|free|in air|"
-    r"stand ?still|at rest",
+    "free": r"(no|without) (weight|load|mass|contact|touch)|noweight|noload|nomass|nocontact|unloaded|free|in air",
     "weight": r"weights?|payloads?|load|loaded|\d+ ?k?g",
     "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing",
     "contact": r"contacts?|touch\w*|push\w*|pok\w*|press\w*|collisions?|collid\w*|hits?",
