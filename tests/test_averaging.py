@@ -103,6 +103,18 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
     assert_allclose(on.noise, x - on.mean[np.arange(samples) % 400], atol=1e-12)
 
 
+@pytest.mark.parametrize("length", [2.0, 1.2345])
+def test_the_variance_at_a_phase_is_over_one_sample_less_than_it_has_whether_samples_fall_on_phases_or_not(length):
+    t = np.arange(1400) / 100
+    x = np.sin(2 * np.pi * t / length) + np.random.default_rng(5).normal(size=len(t))
+    phases = averaging.Phases(t, length, averaging.phases(length, 100))
+    folded = phases.fold(x)
+    assert phases.on_them == (length == 2.0)
+    squares = np.bincount(phases.bins, folded.noise**2, phases.K)
+    assert_allclose(folded.var * (folded.counts - 1), squares, rtol=1e-9)
+    assert_allclose(np.bincount(phases.bins, folded.noise, phases.K), 0.0, atol=1e-9)
+
+
 def test_noise_keeps_its_size_and_stays_white_at_a_period_of_no_whole_number_of_samples():
     t = np.arange(20_000) / 100
     x = np.random.default_rng(0).normal(size=len(t))
