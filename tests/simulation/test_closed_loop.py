@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,22 +146,39 @@ def test_slow_motion_shows_friction_with_hysteresis_and_asymmetry():
     assert [up, -down] == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.slow
-def test_pd_with_gravity_compensation_at_a_controllers_rate_comes_to_rest_at_its_reference():
+def frictionless() -> tuple[Any, Any, Any]:
+    """The arm without friction, what holds its joints, and motors without encoder steps."""
     what, robot = scenario().arm, scenario().robot
     n = 3
     none = what.families["matched"].friction._replace(**{f"coulomb_{d}": np.zeros(n) for d in ("up", "down")})
     none = none._replace(static_up=np.zeros(n), static_down=np.zeros(n))
     body = JointConstraints(none, np.full(n, -1.0), np.full(n, 1.0), np.ones(n, bool))
     plant = arm(robot.chain, robot.bodies, what.motors.gear_ratio**2 * what.rotors)
+    return plant, body, what.motors._replace(encoder_step=np.zeros(n), current_limit=np.full(n, 100.0))
+
+
+def untouched(ticks: int) -> Surroundings:
+    """Nothing that acts on the arm."""
+    return Surroundings(np.zeros((ticks, 3)), np.zeros((ticks, 3)), 0.0, 0.0, 0.0, np.zeros(3), UP.copy(), False)
+
+
+def test_the_damping_of_a_controller_is_its_gain_times_the_change_of_position_over_its_period():
+    plant, body, motors = frictionless()
+    law = Regulator(np.zeros(3), np.array([50.0, 40.0, 30.0]), np.zeros(3), 0.0)
+    fallen = simulate(plant, body, motors, law, Timing(5e-4, 2), np.zeros((60, 3)), untouched(120), np.full(3, 0.1))
+    assert (np.ptp(fallen.q, axis=0) > 1e-6).all()
+    assert fallen.tau[1:] == pytest.approx(-law.derivative * np.diff(fallen.q, axis=0) / 1e-3, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_pd_with_gravity_compensation_at_a_controllers_rate_comes_to_rest_at_its_reference():
+    plant, body, motors = frictionless()
     goal = np.array([-np.pi / 8, np.pi / 8, 0.1])
-    law = Regulator(np.full(n, 500.0), np.array([50.0, 50.0, 40.0]), np.zeros(n), 1.0)
+    law = Regulator(np.full(3, 500.0), np.array([50.0, 50.0, 40.0]), np.zeros(3), 1.0)
     ticks, K = 2, 6000
     reference = np.tile(goal, (K, 1))
-    motors = what.motors._replace(encoder_step=np.zeros(n), current_limit=np.full(n, 100.0))
-    free = Surroundings(
-        np.zeros((K * ticks, n)), np.zeros((K * ticks, 3)), 0.0, 0.0, 0.0, np.zeros(3), UP.copy(), False
-    )
-    found = simulate(plant, body, motors, law, Timing(5e-4, ticks), reference, free, np.zeros(n))
+    found = simulate(plant, body, motors, law, Timing(5e-4, ticks), reference, untouched(K * ticks), np.zeros(3))
     assert found.q[-1] == pytest.approx(goal, abs=1e-4)
-    assert found.tau[-1] == pytest.approx(gravity(robot.chain, robot.bodies, found.q[-1]), abs=1e-2)
+    assert found.tau[-1] == pytest.approx(
+        gravity(scenario().robot.chain, scenario().robot.bodies, found.q[-1]), abs=1e-2
+    )
