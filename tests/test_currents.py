@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import davinci_forces
-from davinci_forces.identification.candidates import share_parameters
+from davinci_forces.identification.candidates import coupled_joints, share_parameters
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled_arm
 from tests import arm
@@ -83,3 +83,6 @@ def test_joints_share_no_parameters_with_one_whose_gain_is_not_known():
     assert share_parameters(UNKNOWN, [1, 2])
     assert not share_parameters(UNKNOWN, [0, 1, 2])
     assert not share_parameters(ROBOT, [1])
+    names = [joint.name for joint in ROBOT.joints]
+    groups = [coupled_joints(ROBOT, rows, dict.fromkeys(names, ())).group for rows in ([1], [0, 1, 2])]
+    assert groups == [names[1], "arm"]

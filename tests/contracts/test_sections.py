@@ -285,6 +285,26 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     assert said == "On an unseen path the model errs by 5 % on the hand roll, but its band is too narrow."
 
 
+def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):
+    fit = full.own_fits()[0]
+    names, scale = fit.parameter.copy(), np.zeros(len(fit))
+    assert joints.scales(full, fit.group, replace(fit, scale=scale)) == ""
+    names[:2], scale[:2] = ("smooth friction", "presliding friction 1"), (0.03, 0.002)
+    said = joints.scales(full, fit.group, replace(fit, parameter=names, scale=scale))
+    assert (
+        said
+        == " Friction reverses or decays within 0.0300 rad/s (smooth friction), 0.00200 rad (presliding friction 1)."
+    )
+
+
+@pytest.mark.parametrize(("sought", "said"), [(0.1, "hides efforts of"), (0.4, "is more than a third of"), (5.0, "")])
+def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(full: Context, sought, said):
+    space = replace(full.catalogue.records(FreeSpace)[0], detection_level=0.2, coverage=0.95)
+    looks = [text for _, text in summary.looks_at_band(full, Trust("hand_roll", None, space, sought))]
+    assert len(looks) == bool(said)
+    assert all(said in text for text in looks)
+
+
 def test_an_error_of_twice_the_effort_suggests_a_wrong_sign(full: Context):
     p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.model_error" in full.results)
     for share, suggests in ((2.04, True), (1.5, False)):

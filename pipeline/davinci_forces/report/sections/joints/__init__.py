@@ -14,6 +14,7 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
+    Number,
     OnScreen,
     Panel,
     Prose,
@@ -151,9 +152,21 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
-        f"Mean squared error of the effort{whose}: {mse}.{coupled}"
+        f"Mean squared error of the effort{whose}: {mse}.{scales(context, joint, fit)}{coupled}"
     )
     return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
+
+
+def scales(context: Context, joint: str, fit: Fit) -> str:
+    """State the displacement or velocity within which frictions of a joint reverse or decay; "" without any."""
+    parts = []
+    for i in of_joint(fit, joint):
+        if fit.scale[i] > 0.0:
+            name = str(fit.parameter[i]).removesuffix(f" of {joint}")
+            unit = "{position}" if name.startswith("presliding") else "{position}/s"
+            size = Number(float(fit.scale[i]), format_unit(context.study.robot.joint(joint).unit(unit)), digits=3)
+            parts.append(f"{size} ({name})")
+    return f" Friction reverses or decays within {', '.join(parts)}." if parts else ""
 
 
 def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str = "") -> tuple[Cell, ...]:
