@@ -7,7 +7,7 @@ import re
 import signal
 import sys
 import threading
-from _thread import start_new_thread
+from _thread import LockType, allocate_lock, start_new_thread
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -147,12 +147,16 @@ def stop(number: int, _: object) -> None:
     ignore_signals()
     sys.unraisablehook = lambda _: None  # a `Stopped` that a destructor raises would only be printed
     threading.excepthook = lambda _: None  # threads may raise because their worker processes end
-    start_new_thread(leave, (128 + number,))  # `threading.Thread` waits for a lock that this thread may hold
+    begins = allocate_lock()
+    begins.acquire()
+    start_new_thread(leave, (128 + number, begins))  # `threading.Thread` waits for a lock that this thread may hold
+    begins.acquire(timeout=STOP_TIMEOUT)  # Python 3.11.2 crashes if it ends while a thread begins
     raise Stopped(128 + number)
 
 
-def leave(code: int) -> None:
-    """End this process after `STOP_TIMEOUT`, even if it waits for something."""
+def leave(code: int, begins: LockType) -> None:
+    """Release the lock, and end this process after `STOP_TIMEOUT`, even if it waits for something."""
+    begins.release()
     sleep(STOP_TIMEOUT)
     Stopped.say()
     os._exit(code)
