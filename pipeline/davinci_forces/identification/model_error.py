@@ -64,8 +64,9 @@ def squares_of_ridge(part: CandidatePart, theta: Array, noise_std: Array) -> Arr
     """
     if part.ridge.strength <= WEAK_RIDGE:
         return np.zeros(len(theta))
-    free = solve(sum_all(part.by_block), part.with_ridge(WEAK_RIDGE).ridge)
-    [scaled], [size] = scaled_equations(sum_all(part.by_block), part.with_ridge(SMALLEST_SQUARE).ridge)
+    total, ridge = sum_all(part.by_block), part.ridge
+    free = solve(total, ridge._replace(strength=WEAK_RIDGE))
+    [scaled], [size] = scaled_equations(total, ridge._replace(strength=SMALLEST_SQUARE))
     squares, directions = np.linalg.eigh(scaled)
     free_variance = (directions**2 / np.maximum(squares, SMALLEST_SQUARE)).sum(axis=1) / size**2
     by_noise = noise_std**2 * (free_variance / unit_variance(part) - 1.0)
@@ -81,16 +82,15 @@ def models_to_compare(
     """
     if not models:
         return []
-    weakest = max(part.ridge.strength, WEAK_RIDGE)
-    plain = [
-        (errors.score, i) for i, (m, is_plain, errors) in enumerate(models) if is_plain and m.ridge.strength <= weakest
-    ]
+    strongest, own = max(part.ridge.strength, WEAK_RIDGE), identities(part)
+    plain = [(m, errors) for m, is_plain, errors in models if is_plain and m.ridge.strength <= strongest]
+    best_plain = min(plain, key=lambda pair: pair[1].score, default=(None, None))[0]
     best = min((errors for *_, errors in models), key=lambda errors: errors.score)
     return [
         model
-        for i, (model, _, errors) in enumerate(models)
-        if identities(model) != identities(part)
-        if (plain and i == min(plain)[1]) or errors.score - best.score <= MAX_WORSE * standard_error(errors, best)
+        for model, _, errors in models
+        if identities(model) != own
+        if model is best_plain or errors.score - best.score <= MAX_WORSE * standard_error(errors, best)
     ]
 
 

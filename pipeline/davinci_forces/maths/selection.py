@@ -233,8 +233,8 @@ class LeftOut:
         Raises LinAlgError if the columns of the other cells are linearly dependent.
         """
         unseen, fitted, of_all = [], [], solve(self.all, ridge)
-        for kept, groups in self.schemes:
-            unseen.append(groups.errors(solve_each(kept, ridge)) / self.squares)
+        for training, groups in self.schemes:
+            unseen.append(groups.errors(solve_each(training, ridge)) / self.squares)
             fitted.append(groups.errors(of_all) / self.squares)
         return CrossValidation(tuple(unseen), tuple(fitted))
 

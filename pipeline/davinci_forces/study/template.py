@@ -105,13 +105,14 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
             raise BadRequest(f"{file} lies outside {folder}; copy it there first, as a study holds its own logs")
     if not files:
         raise BadRequest(f"{folder} holds no logs")
-    if robot_name.endswith(robots.FILES) and Path(robot_name).is_file():  # named from the current folder
-        with suppress(ValueError):
-            robot_name = Path(robot_name).absolute().relative_to(folder.absolute()).as_posix()
-    if robot_name.endswith(robots.FILES) and not (is_inside(robot_name) and (folder / robot_name).exists()):
-        raise BadRequest(
-            f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
-        )
+    if robot_name.endswith(robots.FILES):
+        if Path(robot_name).is_file():  # named from the current folder
+            with suppress(ValueError):
+                robot_name = Path(robot_name).absolute().relative_to(folder.absolute()).as_posix()
+        if not (is_inside(robot_name) and (folder / robot_name).exists()):
+            raise BadRequest(
+                f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
+            )
     stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
     arms, why_not = (stated, []) if stated else candidates(folder)
     drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])

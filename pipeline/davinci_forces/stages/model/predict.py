@@ -151,9 +151,8 @@ def apply(
         )  # fmt: skip
         yield from model.blocks()
         if is_fitted and (fit == CHOSEN or joint_fit.model != "independent") and not motion.at_rest:
-            label = (model.model, model.estimator)
-            label = (CHOSEN, ".".join(label)) if fit == CHOSEN else label
-            yield residual_of(model, periods.get(motion.joint), label)
+            names = model.model, model.estimator
+            yield residual_of(model, periods.get(motion.joint), (CHOSEN, ".".join(names)) if fit == CHOSEN else names)
 
 
 def residual_of(model: JointModel, average: Average | None, label: tuple[str, str]) -> Residual:

@@ -84,10 +84,15 @@ def of_joint(fit: Fit, joint: str) -> list[int]:
     return [i for i, name in enumerate(map(str, fit.parameter)) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
 
 
+def own_name(fit: Fit, i: int, joint: str) -> str:
+    """The name of a parameter without the joint that it is of."""
+    return str(fit.parameter[i]).removesuffix(f" of {joint}")
+
+
 def equation(joint: str, fit: Fit) -> Equation:
     """The effort of a joint as the sum of the links' effort, if the arm is coupled, and of its own terms."""
     rows = of_joint(fit, joint)
-    names = [str(fit.parameter[i]).removesuffix(f" of {joint}") for i in rows]
+    names = [own_name(fit, i, joint) for i in rows]
     terms = [f"theta_{number} {fit.phi[i]}".removesuffix(" 1") for number, i in enumerate(rows, start=1)]
     if any(map(is_of_link, fit.phi)):
         terms.insert(0, "sum_j beta_j Y_j (q, dot(q), dot.double(q))")
@@ -98,7 +103,7 @@ def equation(joint: str, fit: Fit) -> Equation:
 def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
     """State what distinguishes the model in use from the joint by itself, and what it gains on unseen data."""
     base = {str(name) for name in plain.parameter}
-    names = [str(used.parameter[i]).removesuffix(f" of {joint}") for i in of_joint(used, joint)]
+    names = [own_name(used, i, joint) for i in of_joint(used, joint)]
     added = [name for name in names if name not in base]
     row = context.efforts_of(used).index(joint)
     added = [f"“{name}”" if "," in name else name for name in added]
@@ -131,7 +136,7 @@ def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
     for fit in fits:
         for i in of_joint(fit, joint):
             if fit.theta[i] < 0 and fit.positive[i]:
-                name = str(fit.parameter[i]).removesuffix(f" of {joint}")
+                name = own_name(fit, i, joint)
                 values.setdefault(name, []).append((fit.theta[i], fit.theta_std[i], title_of(fit.estimator)))
     for name, negative in values.items():
         clear = [each for each in negative if is_impossible(*each[:2])]
@@ -162,7 +167,7 @@ def scales(context: Context, joint: str, fit: Fit) -> str:
     parts = []
     for i in of_joint(fit, joint):
         if fit.scale[i] > 0.0:
-            name = str(fit.parameter[i]).removesuffix(f" of {joint}")
+            name = own_name(fit, i, joint)
             unit = "{position}" if name.startswith("presliding") else "{position}/s"
             size = Number(float(fit.scale[i]), format_unit(context.study.robot.joint(joint).unit(unit)), digits=3)
             parts.append(f"{size} ({name})")
