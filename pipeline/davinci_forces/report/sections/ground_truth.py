@@ -87,7 +87,7 @@ def effects(context: Context) -> Iterator[Table]:
         yield Table(
             "What was put into the arm, in SI units; the terms that represent it; and their values in the model that "
             "the filter used. Coulomb friction is the mean of its levels up and down, and half their difference is an "
-            "offset or a part of gravity. Presliding friction takes over Coulomb friction.",
+            "offset or a part of gravity. Presliding friction is the part of Coulomb friction that reverses gradually.",
             ("Joint", "Effect", "Put in", "Term", "Estimated"),
             tuple(rows),
             "put-in",
