@@ -544,23 +544,34 @@ def test_no_contact_begins_where_the_smoother_has_no_later_samples():
         assert len(measured(late, quiet, entry(role="contact"))) == found
 
 
+MOVING = np.ones(len(T))  # [rad/s]
+
+
 def test_a_touch_in_a_log_of_free_motion_is_named_and_free_motion_is_not():
     push = np.where((T >= 20) & (T <= 22), 2.0, 0.0)
     for role in ("identification", "validation"):
         about = entry(role=role)
-        assert len(list(assess.run(track(slow_noise(0.05), role=role), about, arm.ARM))) == 2
-        *_, warning = assess.run(track(slow_noise(0.05) + push, role=role), about, arm.ARM)
+        assert len(list(assess.run(track(slow_noise(0.05), role=role, dq=MOVING), about, arm.ARM))) == 2
+        *_, warning = assess.run(track(slow_noise(0.05) + push, role=role, dq=MOVING), about, arm.ARM)
         assert "push/hand_roll: at 2" in warning.text[0]
         assert "give the log the role contact, or state its contact windows" in warning.text[0]
     stated = entry(role="validation", contact=((19.5, 22.5),))
-    assert len(list(assess.run(track(slow_noise(0.05) + push, role="validation"), stated, arm.ARM))) == 2
+    assert len(list(assess.run(track(slow_noise(0.05) + push, role="validation", dq=MOVING), stated, arm.ARM))) == 2
+
+
+def test_friction_of_a_joint_that_slows_down_to_a_stop_is_no_touch():
+    push = np.where((T >= 20) & (T <= 20.5), 2.0, 0.0)
+    stops = np.interp(T, [0.0, 19.9, 20.0, 20.4, 20.5, 40.0], [1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    for dq, warnings in ((MOVING, 1), (stops, 0), (0.0 * T, 0)):
+        of = track(slow_noise(0.05) + push, role="validation", dq=dq)
+        assert len(list(assess.run(of, entry(role="validation"), arm.ARM))) == 2 + warnings
 
 
 @pytest.mark.parametrize(("size", "touches"), [(2.9, False), (3.1, True), (-3.1, True)])
 def test_what_is_three_times_above_the_level_of_the_rest_of_a_log_is_a_touch(monkeypatch, size, touches):
     monkeypatch.setattr(assess, "typical_alarm_level", lambda *given: 0.1)
     effort = np.where(np.arange(len(T)) == 2000, 0.1 * size, 0.0)
-    warnings = assess.touch_warning(track(effort), np.ones(len(T), bool), arm.ARM)
+    warnings = assess.touch_warning(track(effort, dq=MOVING), np.ones(len(T), bool), arm.ARM)
     assert ["at 20.00 s" in warning.text[0] for warning in warnings] == [True] * touches
 
 
