@@ -36,7 +36,7 @@ CUTOFF_GRID = (5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 30.0)  # [Hz],
 MAX_CUTOFF = 0.4  # of the sampling rate
 LAG_GRID = tuple(0.0025 * k for k in range(-4, 5))  # [s]
 RIDGE_GRID = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-DISPLACEMENT_GRID = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
+DISPLACEMENT_GRID = (0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
 WIDTH_GRID = (0.03, 0.1, 0.3)  # of the root mean square velocity
 DECAY_VELOCITY_GRID = (0.1, 0.3, 0.6)  # likewise
 MAX_PRESLIDING = 2  # deflections of one joint
@@ -131,6 +131,9 @@ class JointSearch:
         if step is None:
             return None
         steps, is_first = [step], True
+        term = self.add_term(step)  # with the study's low-pass: another one, chosen without the term, may hide it
+        if term and term.score < self.improve_processing(step, start, True).score:
+            steps.append(term)
         while step is not None:
             moved = self.improve_processing(steps[-1], start, is_first)
             steps += [moved] if moved.improves(steps[-1]) else []
