@@ -509,6 +509,31 @@ def test_a_push_is_found_in_a_stated_window_that_it_fills_or_leaves():
         assert contact.found[0] == found
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_peak_that_smoothing_flattens_is_at_least_the_mean(sign):
+    """A push of 0.3 s and 2 N m, of which a smoother of 0.5 s shows three quarters."""
+    push = 2.0 * sign * ((T >= 20.0) & (T <= 20.3))
+    of = replace(track(smoothed(push, 0.5), std=0.02, smooth_rise=0.5), tau_ext_direct=push)
+    quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.06, 0.005, "c", 1, 0.95, 0.01, 0.2)]
+    *_, contact = measured(of, quiet, entry(role="contact", contact=((20.0, 20.3),)))
+    assert np.abs(of.tau_ext_smooth).max() < 1.5
+    assert contact.peak.tolist() == contact.mean.tolist() == [pytest.approx(2.0 * sign, rel=0.05)]
+    *_, wide = measured(of, quiet, entry(role="contact", contact=((18.0, 22.0),)))
+    assert abs(wide.peak[0]) == np.abs(of.tau_ext_smooth).max() > 2 * abs(wide.mean[0])
+
+
+def test_what_a_contact_lies_outside_its_stated_window_is_in_its_error():
+    push = 3.0 * np.where(np.abs(T - 10.0) <= 1.0, np.cos(np.pi / 2 * (T - 10.0)) ** 2, 0.0)
+    quiet = [Threshold("hand_roll", "rts", 0.01, 0.001, 0.02, 0.002, "c", 1, 0.95, 0.01, 0.2)]
+    wide, narrow = (
+        measured(track(push, std=0.002), quiet, entry(role="contact", contact=(window,)))[0]
+        for window in ((8.0, 12.0), (9.6, 10.4))
+    )
+    assert wide.onset_std[0] < 0.3
+    assert narrow.onset[0] == wide.onset[0]
+    assert (narrow.onset_std[0], narrow.release_std[0]) == pytest.approx((9.6 - wide.onset[0], wide.release[0] - 10.4))
+
+
 def test_the_error_of_an_impulse_includes_those_of_onset_and_release_unless_its_window_is_stated():
     """Flanks of half a cosine: where the smoother starts the contact late, part of the impulse lies before it."""
     flank = np.clip(np.minimum((T - 10.0) / 0.15, (10.5 - T) / 0.15), 0.0, 1.0)
@@ -634,10 +659,10 @@ def test_the_error_of_an_onset_is_noise_over_slope_the_shape_of_the_rise_and_noi
     ramp = 2.0 * np.clip((T - 5.0) / 0.8, 0.0, 1.0) * (T <= 20.0)
     for std in (0.0, 0.05, 0.5):
         [found] = events(T, ramp, np.full(len(T), std), 0.3, rise=0.0)
-        assert found.onset == pytest.approx(5.0, abs=1e-9)
+        assert found.onset == pytest.approx(5.0 - 0.2 * 0.8, abs=1e-9)
         crossing = std * 0.8 / 2.0
         longer = np.sqrt(0.8**2 + 2 * 0.8 * 2 * np.sqrt(2) * crossing)
-        expected = np.linalg.norm([crossing, 0.3 * 0.8 / np.sqrt(3), 0.5 * (longer - 0.8)])
+        expected = np.linalg.norm([crossing, 0.2 * 0.8, 0.5 * (longer - 0.8)])
         assert found.onset_std == pytest.approx(expected, rel=1e-9)
 
 

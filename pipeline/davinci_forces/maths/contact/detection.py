@@ -5,15 +5,17 @@ that level once in ten minutes; the level is at least the largest effort of free
 
     level = rms sqrt(2 ln(v_0 / false alarms a second)),    v_0 upward crossings of zero a second         (Rice 1944)
 
-An onset is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
+An onset is that of a ramp of duration T that the smoother widens about its middle, and .2 T earlier; a step becomes
+T_s long:
 
-    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
+    onset = t(half the peak) - .7 T,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
 A smoothed step has T = 0: it approaches both of its levels exponentially, with its steepest slope 1 / T_s in between.
 The peak of these shares is the median of what exceeds 3/4 of the largest sample, which noise raises; a ramp begins at
-the same time by either.  A push that rises like a squared sine begins .3 T before such a ramp.  Real pushes lie between
-the two, so the standard error of an onset contains, besides noise, the root mean square of what lies evenly between:
-.3 T/sqrt(3).  Noise in T counts as much as it could lengthen T, since near a step T is the root of a small difference.
+the same time by either.  A push that rises like a squared sine begins .25 T before such a ramp, and one of least jerk,
+as of a hand, .4 T.  Real pushes lie between ramp and hand: onsets are put in the middle, .2 T from either, and the
+standard error contains these .2 T besides noise.  Noise in T counts as much as it could lengthen T, since near a step T
+is the root of a small difference.
 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
@@ -37,7 +39,8 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
-SHAPE = 0.3 / 3.0**0.5  # standard deviation of an onset by the shape of the push, over the duration of its rise
+SHIFT = 0.2  # of the duration of a rise: how much earlier than a ramp a push of a typical shape begins
+SHAPE = 0.2  # standard deviation of an onset by the shape of the push, over the duration of its rise
 STEP_WIDTH = 2.0 * float(np.log(2.0))  # T_seen of a step, in T_s
 TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
@@ -131,7 +134,7 @@ def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int,
     duration, crossing_std = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0))), std[k] * apparent / peak
     longer = float(np.sqrt(duration**2 + 2.0 * apparent * (2.0 * 2.0**0.5 * crossing_std)))  # T_seen = 2 (t - t)
     error = np.linalg.norm([crossing_std, SHAPE * duration, 0.5 * (longer - duration)])
-    return middle - 0.5 * inwards * duration, float(error)
+    return middle - (0.5 + SHIFT) * inwards * duration, float(error)
 
 
 def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:

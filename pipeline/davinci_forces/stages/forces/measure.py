@@ -58,13 +58,18 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
 
 
 def match_windows(windows: Sequence[Window], detected: Sequence[Event]) -> Iterator[tuple[Window, Event | None, bool]]:
-    """Pair each stated window with the contact that was detected in it; then yield the contacts without a window."""
+    """Pair each stated window with the contact that was detected in it; then yield the contacts without a window.
+
+    The errors of onset and release are at least what they lie outside the window.
+    """
     unstated = set(detected)
     for start, end in windows:
         inside = [e for e in detected if is_within(e, (start - WINDOW_MARGIN, end + WINDOW_MARGIN))]
         unstated -= set(inside)
-        first, last = (inside[0], inside[-1]) if inside else (None, None)
-        event = Event(*first[:2], *last[2:]) if first and last else None
+        event = Event(*inside[0][:2], *inside[-1][2:]) if inside else None
+        if event:  # what lies outside its window contradicts it by as much
+            early, late = max(event.onset_std, start - event.onset), max(event.release_std, event.release - end)
+            event = event._replace(onset_std=early, release_std=late)
         yield (start, end), event, True
     widened = [(start - WINDOW_MARGIN, end + WINDOW_MARGIN) for start, end in windows]
     for event in detected:
@@ -96,7 +101,8 @@ def contacts(
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts, and any outside them.
 
     A contact is not found if the 95 % interval of its peak holds zero, as where the arm swings after a larger push.
-    What the smoother rounds off does not count in that interval: it makes a peak smaller, never larger.
+    What the smoother rounds off does not count in that interval: it makes a peak smaller, never larger.  A peak is at
+    least the mean.
     """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
@@ -120,7 +126,8 @@ def contacts(
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
-            rows.append((int(stated), int(event is not None), *times, *duration, *summary[:4], *impulse))
+            peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))  # flattened, if short
+            rows.append((int(stated), int(event is not None), *times, *duration, peak, *summary[1:4], *impulse))
             above.append(is_above[~is_outside(track.t, [window])].any())
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
