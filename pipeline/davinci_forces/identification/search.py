@@ -133,7 +133,7 @@ class JointSearch:
         steps, is_first = [step], True
         term = self.add_term(step)  # with the study's low-pass: another one, chosen without the term, may hide it
         if term and term.score < self.improve_processing(step, start, True).score:
-            steps.append(term)
+            steps, is_first = [step, term], False
         while step is not None:
             moved = self.improve_processing(steps[-1], start, is_first)
             steps += [moved] if moved.improves(steps[-1]) else []
