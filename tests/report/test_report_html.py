@@ -15,18 +15,8 @@ import numpy as np
 import pytest
 from report_documents import HOSTILE, document, zoomable
 
-from davinci_forces.report.content import (
-    Document,
-    Equation,
-    Figure,
-    Line,
-    Number,
-    OnScreen,
-    Panel,
-    Prose,
-    Section,
-    Table,
-)
+from davinci_forces.report.content import Document, Equation, Figure, Number, OnScreen, Panel, Prose, Section, Table
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.writers import html
 from davinci_forces.report.writers.numbers import CODES, numbers_json
 from davinci_forces.report.writers.typesetting import NotTypeset

@@ -13,24 +13,10 @@ from davinci_forces.report.campaign.studies import (
     joints_of,
     series_key,
 )
-from davinci_forces.report.content import (
-    Band,
-    Block,
-    Bullets,
-    Cell,
-    Document,
-    Figure,
-    HLine,
-    Number,
-    Panel,
-    Points,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-    literal,
-)
-from davinci_forces.report.content.marks import AnyMark
+from davinci_forces.report.content import Block, Bullets, Cell, Document, Figure, Panel, Prose, Section, Table, Verdict
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import AnyMark, Band, HLine, Points
+from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import count, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.verdicts import band, verdict_words

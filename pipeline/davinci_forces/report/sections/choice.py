@@ -7,7 +7,8 @@ import numpy as np
 from davinci_forces.records import Choice, ModelSearch, Prediction
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Points, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import paper_or_screen, run_cells, section_of
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from davinci_forces import filters
 from davinci_forces.records import Comparison, FilterNoise, Streamed, Track
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Points, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import Line, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from davinci_forces.records import Fit, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, Line, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import first_on_paper, run_name, section_of

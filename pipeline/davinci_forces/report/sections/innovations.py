@@ -6,19 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
-from davinci_forces.report.content import (
-    AnyMark,
-    Block,
-    Cell,
-    Figure,
-    HBand,
-    Line,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    literal,
-)
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import AnyMark, HBand, Line
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
 

@@ -5,20 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
-from davinci_forces.report.content import (
-    Bars,
-    Block,
-    Cell,
-    Figure,
-    Histogram,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Prose,
-    Table,
-    Verdict,
-)
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content.marks import Bars, Histogram, Line, Points
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_cells, run_name, section_of
 from davinci_forces.report.verdicts import MAX_PERIOD_NOISE

@@ -9,21 +9,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.records import Column, PathShare, Prediction, Record, Residual, Track, Whiteness
-from davinci_forces.report.content import (
-    AnyMark,
-    Block,
-    HBand,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Reference,
-    Section,
-    Stems,
-    Table,
-    VSpan,
-    literal,
-)
+from davinci_forces.report.content import Block, OnScreen, Panel, Section, Table, literal
+from davinci_forces.report.content.marks import AnyMark, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.verdicts import Trust, decisive
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Table
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections.parts import (
     contact_spans,

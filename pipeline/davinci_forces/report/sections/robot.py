@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Links, Pose, Workspace
-from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
-from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.content import Block, Figure3D, Prose, Table, literal
+from davinci_forces.report.content.marks import Colour, Line3D, Points3D
 from davinci_forces.report.content.number import MISSING
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of, strokes

@@ -4,22 +4,8 @@ from collections.abc import Iterator
 
 from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
 from davinci_forces.records.forces import SMOOTHER
-from davinci_forces.report.content import (
-    AnyMark,
-    Band,
-    Block,
-    Bullets,
-    Cell,
-    Figure,
-    Line,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import (
     contact_spans,

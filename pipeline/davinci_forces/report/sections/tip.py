@@ -8,26 +8,19 @@ from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, TipBudget, TipContact, TipForce
 from davinci_forces.report.content import (
-    Band,
-    Bars,
     Block,
     Cell,
     Equation,
     Figure,
     Figure3D,
-    HLine,
-    Line,
-    Line3D,
     OnScreen,
     Panel,
-    Points3D,
     Prose,
     Table,
     Verdict,
-    VSpan,
-    literal,
 )
-from davinci_forces.report.content.marks import AnyMark, Colour
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import section_of, strokes

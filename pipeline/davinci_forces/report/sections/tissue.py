@@ -7,24 +7,8 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Push, Stiffness, TissueModel
-from davinci_forces.report.content import (
-    Band,
-    Block,
-    Cell,
-    Figure,
-    Histogram,
-    HLine,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Prose,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
-from davinci_forces.report.content.marks import AnyMark, Colour
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, Histogram, HLine, Line, Points, VSpan
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, THESIS_TISSUE, section_of
 from davinci_forces.report.verdicts import is_minority, stiffness_level

@@ -4,19 +4,8 @@ import math
 from collections.abc import Iterator
 
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Figure,
-    Line,
-    Number,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-    literal,
-)
+from davinci_forces.report.content import Block, Cell, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, mass_level, percent

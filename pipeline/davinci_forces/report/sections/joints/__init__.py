@@ -14,16 +14,16 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
-    Number,
     OnScreen,
     Panel,
     Prose,
     Section,
     Table,
-    Tiles,
     Verdict,
-    literal,
 )
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import Tiles
+from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators

@@ -6,22 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
-from davinci_forces.report.content import (
-    Block,
-    Bullets,
-    Cell,
-    Figure,
-    HBand,
-    Line,
-    Panel,
-    Points,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import scored_predictions, trust
 from davinci_forces.report.sections.summary.opening import (
