@@ -38,6 +38,7 @@ from davinci_forces.records.record import (
     Names,
     Origin,
     Record,
+    by_name,
     diagnostic,
     first_of_each_kind,
 )
@@ -75,7 +76,7 @@ __all__ = [
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
     "TipBudget", "TipContact", "TipForce", "TissueModel", "TorqueConstant", "Touch", "Track", "Trajectory",
-    "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic", "first_of_each_kind",
+    "Tuning", "Weight", "Whiteness", "Workspace", "by_name", "diagnostic", "first_of_each_kind",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {

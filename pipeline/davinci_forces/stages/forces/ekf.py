@@ -74,19 +74,16 @@ def track_effort(
         friction = part.standing * part.static_friction**2 / 3.0
         model_variance = np.maximum(variance[rows] - own[rows] ** 2, 0.0)
         yield Track.like(
+            estimate,
+            noise,
             model,
             filter=DEFAULT,
-            r_q=noise.r_q,
-            r_dq=noise.r_dq,
-            q_dq=noise.q_dq,
             q_tau=noise.q_tau * model.rate**0.5,
             day_offset=offset.value,
             day_offset_std=offset.std,
             band_from=source,
             **numbers,
             t=part.t,
-            q=estimate.q,
-            dq=estimate.dq,
             tau=part.tau,
             tau_hat=part.tau_hat,
             tau_ext=estimate.tau_ext - offset.value,
@@ -96,9 +93,6 @@ def track_effort(
             tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction + rounding[rows] ** 2),
             tau_ext_rounding=rounding[rows],
             tau_ext_direct=part.tau - part.tau_hat - offset.value,
-            innovation_q=estimate.innovation_q,
-            innovation_dq=estimate.innovation_dq,
-            nis=estimate.nis,
             standing=part.standing,
             unscored=part.unscored,
         )

@@ -16,7 +16,7 @@ from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
-from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track
+from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track, by_name
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -116,10 +116,7 @@ def streamed_peak(t: Array, tau_ext: Array, contact: Contact, row: int, late: fl
 
 def gather(streams: Iterable[Streamed]) -> Iterator[StreamLevel]:
     """Compute the alarm level of each joint's stream, and count the contacts whose peak exceeds it."""
-    by_joint: dict[str, list[Streamed]] = {}
-    for stream in streams:
-        by_joint.setdefault(stream.joint, []).append(stream)
-    for joint, logs in by_joint.items():
+    for joint, logs in by_name(streams, "joint").items():
         levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in logs]
         level, source = max(zip(levels, logs, strict=True), key=lambda pair: pair[0])
         yield StreamLevel(

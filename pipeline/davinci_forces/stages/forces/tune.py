@@ -9,7 +9,7 @@ from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import smallest_q_tau, steady_std
 from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
-from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
+from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning, by_name
 
 POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous")  # fields that are pooled by the median
 TRIAL_DELAYS = (0.02, 0.05, 0.1, 0.2, 0.4)  # [s]
@@ -58,10 +58,7 @@ def gather(tunings: Iterable[Tuning], *, delay: float) -> Iterator[FilterNoise]:
 
     The inertia is the largest one, because the filter is slowest with it.
     """
-    by_joint: dict[str, list[Tuning]] = {}
-    for tuning in tunings:
-        by_joint.setdefault(tuning.joint, []).append(tuning)
-    for joint, ts in by_joint.items():
+    for joint, ts in by_name(tunings, "joint").items():
         medians = {name: float(np.median([getattr(t, name) for t in ts])) for name in POOLED}
         inertia, trials = max(t.inertia for t in ts), np.array(TRIAL_DELAYS)
         std = np.array([std_with_delay(inertia, medians, trial) for trial in TRIAL_DELAYS])

@@ -57,7 +57,7 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     results = {name: statistics(x) for name, x in signals.items()}
     all_white = int(all(r["white"] and float(r["periodogram_p"]) > MIN_PROBABILITY for r in results.values()))  # type: ignore[arg-type]
     for name, result in results.items():
-        yield Whiteness(log=subject.log, joint=subject.joint, signal=name, all_white=all_white, **result)  # type: ignore[arg-type]
+        yield Whiteness.like(subject, signal=name, all_white=all_white, **result)
 
 
 def statistics(x: Column) -> dict[str, object]:
@@ -200,9 +200,8 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     """The result of a search for the causes of innovations that are not white, trial by trial."""
     trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.possible_contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
-    return Explanation(
-        log=model.log,
-        joint=model.joint,
+    return Explanation.like(
+        model,
         finding=classify(causes),
         verdict=verdict(causes) + caveat,
         clock_std=clock_std,

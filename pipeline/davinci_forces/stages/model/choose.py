@@ -35,6 +35,7 @@ from davinci_forces.records import (
     ModelSearch,
     Motion,
     Prediction,
+    by_name,
     diagnostic,
 )
 from davinci_forces.records.prediction import CHOSEN
@@ -104,11 +105,8 @@ def fits(
 def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
     """The joints of each log, in the robot's order; with several clocks, only joints on the first joint's clock."""
     joints, periods = [joint.name for joint in robot.joints], list(averages)
-    records: dict[str, list[Motion]] = defaultdict(list)
-    for record in motions:
-        records[record.log].append(record)
     logs: list[Observed] = []
-    for log_records in records.values():
+    for log_records in by_name(motions, "log").values():
         ordered = sorted(log_records, key=lambda record: joints.index(record.joint))
         logs.append(observe([r for r in ordered if len(r) == len(ordered[0])], periods, lowpass, len(logs)))
     return logs
@@ -178,11 +176,9 @@ def is_used(search: SearchResult, chosen: Candidate) -> bool:
 def search_record(search: SearchResult, used: bool) -> ModelSearch:
     """The steps of the search for the model of a joint."""
     steps, chosen = search.steps, search.chosen
-    return ModelSearch(
-        joint=search.joint,
-        structure=search.structure,
-        cutoff=chosen.processing.cutoff,
-        effort_lag=chosen.processing.effort_lag,
+    return ModelSearch.like(
+        search,
+        chosen.processing,
         ridge=chosen.strength,
         term=tuple(term.name for term in chosen.terms),
         term_scale=tuple(term.scale for term in chosen.terms),
@@ -243,7 +239,8 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
     model, log = part.model, part.library.logs[0]
     processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
     defined = model.parameters
-    return Fit(
+    return Fit.like(
+        estimate,
         group=model.group,
         model=candidate.variant,
         estimator=estimator,
@@ -258,7 +255,6 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
         unit=np.array([parameter.unit for parameter in defined], object),
         scale=np.array([parameter.scale for parameter in defined]),
         positive=np.array([parameter.positive for parameter in defined], float),
-        **estimate._asdict(),
     )
 
 

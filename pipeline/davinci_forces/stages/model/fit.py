@@ -256,7 +256,8 @@ def fit_record(
     """The Fit of an estimate, with its mean square error and R2 on its own data."""
     squares, r2 = fit_residual(regression, estimate) ** 2, r_squared(regression, estimate)
     mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
-    return Fit(
+    return Fit.like(
+        estimate,
         group=model.group,
         model=model.name,
         estimator=name,
@@ -271,17 +272,13 @@ def fit_record(
         r2=r2,
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
-        correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         scale=np.array([parameter.scale for parameter in model.parameters]),
         positive=np.array([parameter.positive for parameter in model.parameters], float),
-        theta=estimate.theta,
-        theta_std=estimate.theta_std,
         theta_std_noise=estimate.standard_errors.noise,
         theta_std_model=estimate.standard_errors.model,
-        theta_std_classical=estimate.theta_std_classical,
     )
 
 
