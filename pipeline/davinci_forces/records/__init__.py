@@ -85,12 +85,10 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Motion, Average,
         PeriodResidual, Trajectory, Spectrum, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
-        FreeMotion,
-        ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse,
-        HapticRun,
-        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
-        Explanation, Diagnostic,
+        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
+        FreeWeight, TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion,
+        HapticResponse, HapticRun, JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce,
+        Whiteness, Innovation, Explanation, Diagnostic,
     )
 }  # fmt: skip
 

@@ -17,19 +17,12 @@ from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.whiteness import TWO_SIDED_95, TWO_SIDED_99, cross_correlation, mean_square_band
 from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run, spans
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
-from davinci_forces.records import (
-    Column,
-    Explanation,
-    FilterNoise,
-    Fit,
-    Innovation,
-    JointModel,
-    Motion,
-    PeriodResidual,
-    Residual,
-    Track,
-    Whiteness,
-)
+from davinci_forces.records.forces import FilterNoise, Track
+from davinci_forces.records.model import Fit, Residual
+from davinci_forces.records.prediction import JointModel
+from davinci_forces.records.record import Column
+from davinci_forces.records.recordings import Motion, PeriodResidual
+from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 

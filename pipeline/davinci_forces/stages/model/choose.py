@@ -26,19 +26,10 @@ from davinci_forces.identification.used import Identified
 from davinci_forces.maths.selection import standard_error
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
-from davinci_forces.records import (
-    Average,
-    Choice,
-    Diagnostic,
-    Fit,
-    FrictionMap,
-    ModelSearch,
-    Motion,
-    Prediction,
-    by_name,
-    diagnostic,
-)
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.model import Choice, Fit, FrictionMap, ModelSearch
+from davinci_forces.records.prediction import CHOSEN, Prediction
+from davinci_forces.records.record import Diagnostic, by_name, diagnostic
+from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 
 MAPPED_ROLES = ("identification", "friction")

@@ -30,22 +30,19 @@ from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
-from davinci_forces.records import (
-    Column,
+from davinci_forces.records.model import (
     CrossFit,
-    Diagnostic,
     Fit,
     FittedPaths,
     Guess,
     Identifiability,
     MeasurementNoise,
-    Motion,
-    Prediction,
     Residual,
     SwarmSearch,
-    Trajectory,
-    diagnostic,
 )
+from davinci_forces.records.prediction import Prediction
+from davinci_forces.records.record import Column, Diagnostic, diagnostic
+from davinci_forces.records.recordings import Motion, Trajectory
 from davinci_forces.robots.models import Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry

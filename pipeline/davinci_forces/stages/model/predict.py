@@ -15,20 +15,10 @@ from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, UNSCORED_STRETCH, is_outside, spans
-from davinci_forces.records import (
-    Average,
-    Choice,
-    Counts,
-    Diagnostic,
-    Fit,
-    FittedPaths,
-    JointModel,
-    Motion,
-    Prediction,
-    Residual,
-    diagnostic,
-)
-from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
+from davinci_forces.records.model import Choice, Fit, FittedPaths, Residual
+from davinci_forces.records.prediction import CHOSEN, SAME_PATH, JointModel, PathShare, Prediction
+from davinci_forces.records.record import Counts, Diagnostic, diagnostic
+from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
