@@ -36,8 +36,8 @@ def write_report(
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance, ratings, baseline=baseline)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
-    numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
-    numbers["summary.json"] = digest(context)
+    answers = {"summary.txt": answer(context).encode(), "summary.json": digest(context)}
+    numbers = {"results.json": context.results.json(), **answers}
     listed = manifest(provenance, numbers)
     report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
     edition = f"report ID {report_id} · davinci-forces {provenance.version}, code {provenance.code}{dates(catalogue)}"
@@ -63,8 +63,8 @@ def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
     built: list[Section] = []
     for name in names:
         labels = {label for section in built for block in walk(section) if (label := name_of(block))}
-        section = section_builder(name)(replace(context, labels=frozenset(labels)))
-        built += [section] if section is not None else []
+        if section := section_builder(name)(replace(context, labels=frozenset(labels))):
+            built.append(section)
     return tuple(built)
 
 

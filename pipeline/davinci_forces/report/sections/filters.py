@@ -111,15 +111,10 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
     """Every log filtered as samples arrive, beside the smoother."""
     names, of_joint = ("stream_delay", "free_rms", "stream_loss", "peak_ratio"), ("alarm_level", "contacts_found")
-    rows = tuple(
-        (
-            title(s.joint),
-            literal(s.log),
-            *(context.number(f"stream.{s.log}.{s.joint}.{name}", 2) for name in names),
-            *(context.number(f"stream.{s.joint}.{name}", 2) for name in of_joint),
-        )
-        for s in logs
-    )
+    rows = []
+    for s in logs:
+        of_log = context.numbers(f"stream.{s.log}.{s.joint}", names, 2)
+        rows.append((*run_cells(s)[::-1], *of_log, *context.numbers(f"stream.{s.joint}", of_joint, 2)))
     caption = (
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
@@ -128,7 +123,7 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         "once in ten minutes. Contacts found: the number of measured contacts that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
-    return Table(caption, header, rows, "stream", "llrrrrrr")
+    return Table(caption, header, tuple(rows), "stream", "llrrrrrr")
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
@@ -174,19 +169,15 @@ def overlay(compared: list[Comparison]) -> Figure:
 
 def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     """What another delay would cost each joint."""
-    panels = tuple(
-        Panel(
-            title(n.joint), "delay [s]", label(n, "trial_std", "noise"),
-            (Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)), x_log=True,
-        )
-        for n in noises
-    )  # fmt: skip
+    panels = []
+    for n in noises:
+        marks = Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)
+        panels.append(Panel(title(n.joint), "delay [s]", label(n, "trial_std", "noise"), marks, x_log=True))
     return Figure(
-        f"Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown "
-        f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
-        "",
+        "Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown that "
+        f"late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it.",
         f"Noise of the filter over its delay for {count(len(noises), 'joint')}.",
-        panels,
+        tuple(panels),
         "noise-over-delay",
         height=35,
     )

@@ -9,7 +9,7 @@ from davinci_forces import records
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
-from davinci_forces.report.context import Context
+from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
@@ -205,7 +205,7 @@ def paragraph_for_paper(context: Context) -> str:
     return fill(
         f"External efforts of an arm ({robot.title}) were estimated from motor efforts and joint positions with "
         f"davinci-forces {context.provenance.version} (code {context.provenance.code}). Parameters were identified "
-        f"from {len(logs)} recording{'' if len(logs) == 1 else 's'} ({', '.join(sorted(logs))}) of "
+        f"from {count(len(logs), 'recording')} ({', '.join(sorted(logs))}) of "
         f"{sum(s.duration for s in summaries):.0f} s in all at {rates} Hz{averaged}; the model was "
         f"{'selected by cross-validation over blocks of path' if settings.fit == CHOSEN else settings.fit}. Model, "
         "error (root mean square, beyond noise) on unseen data, and level below which 99 % of free-motion samples "

@@ -26,14 +26,14 @@ LEVELS = ("free_rms", "detection_level")
 @section_of("Runs", "runs")
 def section(context: Context) -> Iterator[Block]:
     """The recordings, a table of all tracks, the worst run of each joint, and every run on demand."""
-    yield from recording_blocks(context, context.catalogue.records(LogSummary))
-    yield from track_blocks(context, context.catalogue.records(Track))
+    if summaries := context.catalogue.records(LogSummary):
+        yield from recording_blocks(context, summaries)
+    if tracks := context.catalogue.records(Track):
+        yield from track_blocks(context, tracks)
 
 
 def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
-    if not tracks:
-        return
     yield from intro(context, tracks)
     yield from paper_or_screen(scores(context, tracks))
     joints = dict.fromkeys(track.joint for track in tracks)
@@ -129,8 +129,6 @@ def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
 
 def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
     """One table over all logs, and the remarks of the readers and of the first stages."""
-    if not summaries:
-        return
     yield from paper_or_screen(overview(context, summaries))
     diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("ingest", "resample", "average")]
     remarks_of_stages = [literal(text) for diagnostic in diagnostics for text in diagnostic.text]

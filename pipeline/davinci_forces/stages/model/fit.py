@@ -44,7 +44,7 @@ from davinci_forces.records.prediction import Prediction
 from davinci_forces.records.record import Column, Diagnostic, diagnostic
 from davinci_forces.records.recordings import Motion, Trajectory
 from davinci_forces.robots.models import Reach, independent, round_scale
-from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MAX_PATHS = 20  # number of fitted paths with which a recording is compared
@@ -90,7 +90,7 @@ def run(
         parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
-            yield from fit_joint(model, parts, robot, joint, others, lowpass)
+            yield from fit_joint(model, parts, robot, others, lowpass)
 
 
 def apply(
@@ -113,7 +113,7 @@ def apply(
 
 
 def fit_joint(
-    model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str], lowpass: float
+    model: IndependentJoint, parts: Sequence[Part], robot: Robot, others: Sequence[str], lowpass: float
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
@@ -131,8 +131,8 @@ def fit_joint(
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
-    yield from identifiability(model, regression, estimates, robot, joint, others)
-    yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
+    yield from identifiability(model, regression, estimates, robot, others)
+    yield from cost_of_consistency(model.group, regression, estimates, robot.joint(model.group).unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -158,18 +158,13 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
 
 
 def identifiability(
-    model: IndependentJoint,
-    regression: Regression,
-    estimates: dict[str, Estimate],
-    robot: Robot,
-    joint: Joint,
-    others: Sequence[str],
+    model: IndependentJoint, regression: Regression, estimates: dict[str, Estimate], robot: Robot, others: Sequence[str]
 ) -> Iterator[Identifiability | Diagnostic]:
     """Assess how well the logs determine the parameters, and explain an inertia that is not positive."""
     plain = estimates.get("lse")
     if plain is None:
         return
-    excitation = analyse_columns(regression.triangle)
+    joint, excitation = robot.joint(model.group), analyse_columns(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
     pairs, insignificant = describe_correlated(names, excitation), describe_insignificant(regression, plain)
     yield Identifiability(

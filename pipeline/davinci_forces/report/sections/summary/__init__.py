@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
-from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import scored_predictions, trust
+from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary.opening import (
     as_list,
     logs_in_words,
@@ -39,13 +39,9 @@ MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
-def section(context: Context) -> Section:
+@section_of("The answer", "summary")
+def section(context: Context) -> Iterator[Block]:
     """The answer on one page."""
-    return Section("The answer", "summary", tuple(blocks(context)))
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
     for task, failed in context.provenance.failures.items():
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
