@@ -223,23 +223,16 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint."""
-    p, space = trusted.prediction, trusted.space
-    row: list[Cell] = [title(trusted.joint), trusted.words, trusted.new_path]
-    if p is None:
-        row += ["–"] * 4
-    else:
-        r2 = context.number(f"{p.prefix}.r2", 2)
-        ceiling = context.number(f"{p.prefix}.r2_ceiling", 4, std=None)
-        row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
-    key = space.prefix if space is not None else ""
-    row.append(context.number(f"{key}.detection_level", 2))
-    if with_sought:
-        sought = trusted.sought
-        row.append(context.size(space, "detection_level", sought, 3) if space is not None and sought else "–")
-    return (
-        *row,
-        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–",
+    space, sought, share = trusted.space, trusted.sought, percent(trusted.share)
+    scored, free = (about.prefix if about is not None else "" for about in (trusted.prediction, space))
+    error, r2 = context.numbers(scored, ("model_error", "r2"), 2)
+    ceiling, level = context.number(f"{scored}.r2_ceiling", 4, std=None), context.number(f"{free}.detection_level", 2)
+    size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
+    wanted = (size,) if with_sought else ()
+    covers = (
+        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–"
     )
+    return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
 
 
 def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
