@@ -39,10 +39,9 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     joints = dict.fromkeys(track.joint for track in tracks)
     spaces = [space for joint in joints if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
-    drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
     yield from first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
-    others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
+    others = [t for t in tracks if t not in worst and not t.at_rest]
     if others:
         folded = tuple(
             OnScreen(run_name(t.log, t.joint), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others
