@@ -10,14 +10,7 @@ from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, P
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
-from davinci_forces.report.sections.summary.opening import (
-    as_list,
-    logs_in_words,
-    measurements,
-    nothing_identified,
-    sign_off,
-    verdict_sentence,
-)
+from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import (
     COVERED,
     DETECTABLE,
@@ -46,13 +39,13 @@ def section(context: Context) -> Iterator[Block]:
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
-        yield Prose(f"**{verdict_sentence(context, trusts)}**")
-    if lines := measurements(context):
+        yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
+    if lines := opening.measurements(context):
         yield Bullets(lines)
     if not trusts:
-        yield Prose(logs_in_words(context))
-        yield from nothing_identified(context)
-        yield sign_off(context)
+        yield Prose(opening.logs_in_words(context))
+        yield from opening.nothing_identified(context)
+        yield opening.sign_off(context)
         return
     contacts = context.catalogue.records(Contact)
     yield Prose(opening_paragraph(context, contacts))
@@ -73,7 +66,7 @@ def section(context: Context) -> Iterator[Block]:
     if looks := first_looks_in_order(context, trusts):
         yield Prose("**Look at these first.**")
         yield Bullets(looks)
-    yield sign_off(context)
+    yield opening.sign_off(context)
 
 
 def rule_in_words(trusts: list[Trust]) -> str:
@@ -112,7 +105,7 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
         f"{count(len(context.study.logs), 'log')}. "
-        f"{logs_in_words(context)}"
+        f"{opening.logs_in_words(context)}"
     )
     if not contacts:
         contact_logs = any(log.role == "contact" for log in context.study.logs)
@@ -142,7 +135,7 @@ def largest_peaks(context: Context, contacts: list[Contact]) -> str:
         f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)})"
         for joint, (_, log, number) in ((joint, max(largest)) for joint, largest in joints.items())
     ]
-    return f" Largest: {as_list(peaks)}." if peaks else ""
+    return f" Largest: {opening.as_list(peaks)}." if peaks else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -153,7 +146,7 @@ def efforts_in_words(context: Context) -> str:
         (Kind.PRISMATIC, ""): "force [N] at joints that slide",
     }
     currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
-    return as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
+    return opening.as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
