@@ -56,20 +56,16 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     """The tuned noise of each joint, and the logs of the tuning."""
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            title(noise.joint),
-            *context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau")),
-            literal(", ".join(noise.logs)),
-        )
-        for noise in noises
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for noise in noises:
+        numbers = context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau"))
+        rows.append((title(noise.joint), *numbers, literal(", ".join(noise.logs))))
     caption = (
         "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
         "per square root of a second."
     )
     header = ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on")
-    return Table(caption, header, rows, "filter-tuning", "lrrrrl")
+    return Table(caption, header, tuple(rows), "filter-tuning", "lrrrrl")
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
@@ -129,21 +125,17 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
 def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst run in free space of each joint."""
     names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
-    rows = tuple(
-        (
-            title(c.joint),
-            name_of(c.filter),
-            *(context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names),
-        )
-        for c in compared
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for c in compared:
+        numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
+        rows.append((title(c.joint), name_of(c.filter), *numbers))
     caption = (
         "Filters compared on each joint's worst run in free space. Each has the smallest random walk with which it "
         "follows a push. RMS and detection level: of the external effort in free motion. Peak ratio and delay: the "
         "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
     )
     header = ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay")
-    return Table(caption, header, rows, "filter-comparison", "llrrrr")
+    return Table(caption, header, tuple(rows), "filter-comparison", "llrrrr")
 
 
 def name_of(label: str) -> str:

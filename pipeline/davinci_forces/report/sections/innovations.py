@@ -106,22 +106,16 @@ def trials(e: Explanation) -> Table:
     """The results of the tests without each cause, the largest p-value first."""
     least = least_probability(e)
     order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
-    rows = tuple(
-        (
-            literal(str(e.without[i])),
-            str(e.left[i]),
-            f"{e.walk[i]:.3g}",
-            f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001",
-            "●" if e.explains[i] else "",
-        )
-        for i in order
-    )
+    rows = []
+    for i in order:
+        p, explains = f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001", "●" if e.explains[i] else ""
+        rows.append((literal(str(e.without[i])), str(e.left[i]), f"{e.walk[i]:.3g}", p, explains))
     caption = (
         f"{run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
         "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
     )
     header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
-    return Table(caption, header, rows, f"trials-{e.log}-{e.joint}", "lrrrl")
+    return Table(caption, header, tuple(rows), f"trials-{e.log}-{e.joint}", "lrrrl")
 
 
 def least_probability(e: Explanation) -> Column:

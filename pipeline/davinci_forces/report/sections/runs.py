@@ -160,18 +160,12 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
-    rows = tuple(
-        (
-            literal(summary.log),
-            summary.role,
-            summary.format,
-            context.count(f"log.{summary.log}.rows"),
-            *context.numbers(f"log.{summary.log}", ("rate", "duration"), 5),
-            context.number(f"log.{summary.log}.jitter", 2),
-            context.number(f"period.{summary.log}", 6, std=None),
-            context.count(f"period.{summary.log}.periods"),
-        )
-        for summary in summaries
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for summary in summaries:
+        log, period = f"log.{summary.log}", f"period.{summary.log}"
+        clock = *context.numbers(log, ("rate", "duration"), 5), context.number(f"{log}.jitter", 2)
+        periods = context.number(period, 6, std=None), context.count(f"{period}.periods")
+        samples = context.count(f"{log}.rows")
+        rows.append((literal(summary.log), summary.role, summary.format, samples, *clock, *periods))
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
-    return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
+    return Table("The logs of the study.", header, tuple(rows), "recorded-table", "lllrrrrrr")

@@ -69,16 +69,12 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
 
 def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     """One row a log; in simulations of the thesis's experiments, also the stiffness that the thesis states."""
-    rows: list[tuple[Cell, ...]] = [
-        (
-            literal(tissue.log),
-            "sensor" if tissue.source == "force sensor" else title(tissue.source),
-            *context.numbers(f"tissue.{tissue.log}", ("stiffness", "stiffness_q1", "stiffness_q3"), 4),
-            context.count(f"tissue.{tissue.log}.pushes"),
-            f"{len(tissue)} of {tissue.swings}",
-        )
-        for tissue in tissues
-    ]
+    rows: list[tuple[Cell, ...]] = []
+    for tissue in tissues:
+        key, source = f"tissue.{tissue.log}", "sensor" if tissue.source == "force sensor" else title(tissue.source)
+        numbers = context.numbers(key, ("stiffness", "stiffness_q1", "stiffness_q3"), 4)
+        used, in_contact = context.count(f"{key}.pushes"), f"{len(tissue)} of {tissue.swings}"
+        rows.append((literal(tissue.log), source, *numbers, used, in_contact))
     if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force from", "Stiffness", "Quartile 1", "Quartile 3", "Used", "In contact")
