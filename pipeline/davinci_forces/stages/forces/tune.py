@@ -18,21 +18,18 @@ MIN_NOISE = 1e-9  # over the range of a signal: without noise, the innovations' 
 
 def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float, delay: float) -> Iterator[Tuning]:
     """Tune the filter to a moving joint in an identification log, where nothing touches the robot.  Section 7.3"""
-    if model.role == "identification" and not model.at_rest and noise is not None:
-        yield tuning(model, initial_noise(model, noise, lowpass), delay)
-
-
-def tuning(model: JointModel, before: NoiseModel, delay: float) -> Tuning:
-    """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
+    if model.role != "identification" or model.at_rest or noise is None:
+        return
     parts = [part.part(slice(0, part.samples)) for part in filter_inputs(model)]
     T_s, inertia = 1.0 / model.rate, float(model.inertia.max())
-    noise = tune_noise(parts, before, inertia, model.viscous, delay)
+    before = initial_noise(model, noise, lowpass)
+    tuned = tune_noise(parts, before, inertia, model.viscous, delay)
     initial, final = (
-        sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
+        sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=tuned.q_tau), tuned)
     )
-    return Tuning.like(
-        model, r_q=noise.r_q, r_dq=noise.r_dq, r_tau=noise.q_dq * inertia / T_s, q_tau=noise.q_tau / T_s**0.5,
-        inertia=inertia, likelihood_gain=final - initial, tested=len(model),
+    yield Tuning.like(
+        tuned, model, r_tau=tuned.q_dq * inertia / T_s, q_tau=tuned.q_tau / T_s**0.5, inertia=inertia,
+        likelihood_gain=final - initial, tested=len(model),
     )  # fmt: skip
 
 

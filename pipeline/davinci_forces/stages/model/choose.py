@@ -66,7 +66,7 @@ def run(
     searched = select_candidate(searched_candidates(robot, searches, separate, arm, len(logs)), len(logs))
     selection = better(fixed, searched)
     yield from choice(selection, logs)
-    yield from (search_record(search, is_used(search, selection.chosen)) for search in searches)
+    yield from (search_record(search, selection.chosen) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
         where = "the report may name the cause beside all fits of each joint"
@@ -158,15 +158,11 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
         )
 
 
-def is_used(search: SearchResult, chosen: Candidate) -> bool:
-    """Whether the chosen candidate has the terms of a search."""
-    parts = [part for part in chosen.parts if search.joint in part.model.efforts]
-    return chosen.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
-
-
-def search_record(search: SearchResult, used: bool) -> ModelSearch:
-    """The steps of the search for the model of a joint."""
+def search_record(search: SearchResult, candidate: Candidate) -> ModelSearch:
+    """The steps of the search for the model of a joint, and whether the chosen candidate has its terms."""
     steps, chosen = search.steps, search.chosen
+    parts = [part for part in candidate.parts if search.joint in part.model.efforts]
+    used = candidate.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
     return ModelSearch.like(
         search,
         chosen.processing,
