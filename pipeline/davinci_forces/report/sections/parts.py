@@ -134,8 +134,5 @@ def strokes(start: Column, end: Column) -> Column:
 
 def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Prediction]:
     """The predictions of free motion in logs that no fit uses; all of them if there is none."""
-    return [
-        p
-        for p in predictions
-        if p.role != "identification" and context.study.log(p.log).has_known_free_motion
-    ] or predictions  # fmt: skip
+    free = [p for p in predictions if p.role != "identification" and context.study.log(p.log).has_known_free_motion]
+    return free or predictions

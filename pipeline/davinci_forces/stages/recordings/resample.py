@@ -137,11 +137,8 @@ def velocity_faults(
     hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
     fitting = (hint for hint in hints if joint.kind is Kind.PRISMATIC or "mm" not in hint)
     hint = next(fitting, "check the sign, unit and column of both, and the rate of the clock")
-    what = (
-        f"is {ratio:.3g} times the derivative of the logged position"
-        if ratio < np.inf
-        else "is not 0 though the position stands still"
-    )
+    times = f"is {ratio:.3g} times the derivative of the logged position"
+    what = times if ratio < np.inf else "is not 0 though the position stands still"
     fault = f"{recording.log}/{recording.joint}: the logged velocity {what}; {hint}"
     if not 1 / MAX_VELOCITY_RATIO < ratio < MAX_VELOCITY_RATIO:
         raise BadLog(f"{fault}; without the channel of the velocity, it is derived from the position")
@@ -163,11 +160,9 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
     Raises BadLog if they lie so far beyond that no motion of this joint is like that.
     """
     beyond, largest = [], 0.0
-    names = ("positions", "{position}"), ("velocities", "{position}/s")
-    for (what, unit), x, limits, usual in zip(
-        names, smooth, (joint.limits.q, joint.limits.dq), USUAL_LIMITS, strict=False
-    ):
-        reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, limits))
+    names, limits = (("positions", "{position}"), ("velocities", "{position}/s")), (joint.limits.q, joint.limits.dq)
+    for (what, unit), x, bounds, usual in zip(names, smooth, limits, USUAL_LIMITS, strict=False):
+        reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, bounds))
         assumed, limit = (", which is assumed as none is stated", usual) if np.isinf(limit) else ("", limit)
         if reach > MAX_BEYOND_LIMITS * limit:
             times = f"{reach / limit:.3g} times the limit of {limit:.3g}"
