@@ -181,7 +181,6 @@ def gather(
     of each joint whose current was measured.
     """
     usable = [load for load in loads if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD]
-    units = {joint.name: joint.unit("{effort}") for joint in robot.joints}
     for weighing in weighings.each:
         carrying = [load for load in usable if load.weight == weighing.log == load.log]
         others = [load for load in usable if load.weight == weighing.log != load.log]
@@ -200,7 +199,7 @@ def gather(
         if fault:
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
-        yield from estimate_mass(weighing, weight_loads, tare, others, units)
+        yield from estimate_mass(weighing, weight_loads, tare, others, robot)
 
 
 def torque_constants(
@@ -257,7 +256,7 @@ class FreeMotionErrors(NamedTuple):
 
 
 def estimate_mass(
-    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], units: dict[str, str]
+    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot
 ) -> Iterator[Weight | FreeWeight | Diagnostic]:
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
     free = free_motion_errors(loads, others)
@@ -276,7 +275,7 @@ def estimate_mass(
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
     left = np.array([root_mean_square(residual(row, mass)) for row in sides[0]])
-    tare_mass = free.masses.get(weighing.tare, MassEstimate(float("nan"), float("nan"))) if tare else None
+    tare_mass = free.masses.get(weighing.tare if tare else "", MassEstimate(float("nan"), float("nan")))
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
         yield diagnostic(
@@ -289,9 +288,8 @@ def estimate_mass(
         differing=differing, mass_mirrored=mass_mirrored,
         mass_mirrored_std=widen(mirrored_std, mass_mirrored, alone[1], mirrored_test),
         side=side_of(better(*sides), mass_mirrored), mass_scale=mass / stated, mass_scale_std=std / stated,
-        tare_mass=tare_mass.mass if tare_mass else float("nan"),
-        tare_mass_std=total_std(tare_mass, free) if tare_mass else float("nan"),
-        loaded=np.array(joints, object), unit=np.array([units[joint] for joint in joints], object),
+        tare_mass=tare_mass.mass, tare_mass_std=total_std(tare_mass, free), loaded=np.array(joints, object),
+        unit=np.array([robot.joint(joint).unit("{effort}") for joint in joints], object),
         mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
         mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
         false_mass=false, joint_offset=np.array([offset(row, mass) for row in sides[0]]),

@@ -1,6 +1,5 @@
 """Search for the model of each joint by cross-validation, fit it to all logs, and map its friction over velocity."""
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated
 
@@ -72,13 +71,13 @@ def run(
         where = "the report may name the cause beside all fits of each joint"
         yield diagnostic("choose", "arm", "warning", f"{message}; {where}")
     shown = (*best_of_structures(fixed), *best_of_setting(fixed, fit))
-    by_name = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
-    by_variant = {c.variant: name for name, c in by_name.items()}
-    for name, candidate in by_name.items():
+    named = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
+    by_variant = {c.variant: name for name, c in named.items()}
+    for name, candidate in named.items():
         if name != "independent.lse":
             yield from fits(candidate, fixed.candidates, len(logs), robot, by_variant[candidate.variant] == name)
     yield from fits(selection.chosen, fixed.candidates, len(logs), robot, with_consistent=True)
-    for candidate in by_name.values():
+    for candidate in named.values():
         yield from predictions(candidate, False, logs)
     yield from predictions(selection.chosen, True, logs)
 
@@ -109,13 +108,9 @@ def modelled_logs(
     """The logs of each moving joint by itself, and, if joints move together, the logs that contain all joints."""
     whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.is_moving.any())
     arm = whole if robot.chain is not None and any(log.is_moving.sum() > 1 for log in whole) else ()
-    separate: dict[str, list[Observed]] = defaultdict(list)
-    for log in arm or logs:
-        for i, record in enumerate(log.records):
-            if not record.at_rest:
-                separate[record.joint].append(log.single_joint(i))
-    order = [joint.name for joint in robot.joints if joint.name in separate]
-    return {name: tuple(separate[name]) for name in order}, arm
+    moving = [(r.joint, log.single_joint(i)) for log in arm or logs for i, r in enumerate(log.records) if not r.at_rest]
+    separate = {joint.name: tuple(log for name, log in moving if name == joint.name) for joint in robot.joints}
+    return {name: joint_logs for name, joint_logs in separate.items() if joint_logs}, arm
 
 
 def not_of_arm(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
