@@ -6,21 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
+from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
-from davinci_forces.report.verdicts import (
-    COVERED,
-    DETECTABLE,
-    DETECTED,
-    GOOD,
-    Trust,
-    band_in_words,
-    is_mostly_constant,
-    percent,
-)
+from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
 from davinci_forces.robots.robot import Kind
 
 SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
@@ -263,7 +255,7 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
     """Yield a caveat where the model error calls for caution; it names a constant part that is most of the error."""
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
-    if p is not None and trusted.share > GOOD:
+    if p is not None and trusted.share > verdicts.GOOD:
         error, constant = context.results[f"{p.prefix}.model_error"].number(2), ""
         if is_mostly_constant(p):
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
@@ -272,7 +264,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
         text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
-        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
+        yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
@@ -280,15 +272,15 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
     space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
     if space is None:
         return
-    if trusted.sought and trusted.fineness > DETECTED:
+    if trusted.sought and trusted.fineness > verdicts.DETECTED:
         level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
-        hides = "hides efforts of" if trusted.fineness > DETECTABLE else "is more than a third of"
+        hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         narrow = f"{covers} More logs of free motion, at these speeds and on other days, calibrate it."
-        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
+        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
