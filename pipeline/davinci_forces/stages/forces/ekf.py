@@ -76,16 +76,13 @@ def track_effort(
         yield Track.like(
             estimate,
             noise,
-            model,
+            part,
             filter=DEFAULT,
             q_tau=noise.q_tau * model.rate**0.5,
             day_offset=offset.value,
             day_offset_std=offset.std,
             band_from=source,
             **numbers,
-            t=part.t,
-            tau=part.tau,
-            tau_hat=part.tau_hat,
             tau_ext=estimate.tau_ext - offset.value,
             tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late[rows] ** 2 + model_variance + offset.std**2 + friction),
             tau_ext_std_filter=estimate.tau_ext_std,
@@ -93,8 +90,6 @@ def track_effort(
             tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction + rounding[rows] ** 2),
             tau_ext_rounding=rounding[rows],
             tau_ext_direct=part.tau - part.tau_hat - offset.value,
-            standing=part.standing,
-            unscored=part.unscored,
         )
 
 
