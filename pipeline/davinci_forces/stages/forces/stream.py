@@ -99,11 +99,10 @@ def compare(
     ratios = peak[long] / smooth[long]
     ratio = float(np.median(ratios)) if len(ratios) else float("nan")
     ratio_std = MEDIAN_STD * float(np.std(ratios, ddof=1)) / len(ratios) ** 0.5 if len(ratios) > 1 else float("nan")
-    yield Streamed(
-        log=track.log, joint=track.joint, role=track.role, rate=track.rate, stream_delay=late, free_rms=rms,
-        free_rms_std=rms_std, stream_loss=loss, stream_loss_std=loss_std, free_max=statistics.largest,
-        crossings=statistics.crossings, peak_ratio=ratio,
-        peak_ratio_std=ratio_std, onset=onset, duration=duration, smooth_peak=smooth, peak=peak,
+    yield Streamed.like(
+        statistics, track, stream_delay=late, free_rms=rms, free_rms_std=rms_std, stream_loss=loss,
+        stream_loss_std=loss_std, free_max=statistics.largest, peak_ratio=ratio, peak_ratio_std=ratio_std, onset=onset,
+        duration=duration, smooth_peak=smooth, peak=peak,
     )  # fmt: skip
 
 

@@ -263,11 +263,9 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     valid &= is_evaluated(motion)
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
     return FrictionMap.like(
+        means,
+        fit,
         motion,
-        model=fit.model,
-        estimator=fit.estimator,
-        dq=means.dq,
-        gaining=means.gaining.astype(int),
         tau_friction=means.mean[:, 0],
         tau_friction_std=means.std[:, 0],
         tau_friction_hat=means.mean[:, 1],
