@@ -40,8 +40,7 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     )
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
-    drawn = [e for e in explained if (e.joint, e.log) in worst]
-    drawn.sort(key=lambda e: least_probability(e)[0])
+    drawn = sorted((e for e in explained if (e.joint, e.log) in worst), key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
     yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
