@@ -110,7 +110,7 @@ def contacts(
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     effort = (*steady_effort(track), track.tau_ext_direct)
-    rows, above, short = [], [], []
+    rows, short = [], []
     for window, event, stated in placed:
         summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
         if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.noise_std:
@@ -120,8 +120,8 @@ def contacts(
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
-            rows.append((int(stated), int(event is not None), *times, *duration, *summary[:4], *impulse))
-            above.append(is_above[~is_outside(track.t, [window])].any())
+            above = bool(is_above[~is_outside(track.t, [window])].any())
+            rows.append((stated, event is not None, above, *times, *duration, *summary[:4], *impulse))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
@@ -129,11 +129,10 @@ def contacts(
     if not rows:
         return
     names = (
-        "stated", "found", "onset", "onset_std", "release", "release_std", "duration", "duration_std", "peak",
+        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std", "peak",
         "peak_std", "mean", "mean_std", "impulse", "impulse_std",
     )  # fmt: skip
-    columns = dict(zip(names, np.array(rows).T, strict=True))
-    yield Contact.like(threshold, log=track.log, above=np.array(above, np.int64), **columns)
+    yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
 
 
 def steady_effort(track: Track) -> tuple[Array, Array]:
