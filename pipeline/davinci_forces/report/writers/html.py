@@ -53,21 +53,17 @@ def render(document: Document) -> bytes:
         "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
     still = {name: thin_figure(figure, STILL_POINTS) for name, figure in figures.items() if name not in zooms}
-    kept = {name: (numbers_json(figure), "") for name, figure in still.items()}
-    text = _fill(page, [*kept, *zooms])
-    room = LARGEST - len(text.encode()) - sum(len(content) for content, _ in kept.values())
-    traces = _thin_figures(zooms, room)
-    kept |= {name: (numbers_json(f), thinning_note(zooms[name].samples, f.samples)) for name, f in traces.items()}
-    return _put_in(text, kept).encode()
-
-
-def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
-    """The page with numbers and notes in place of the signs from `_fill`, once the room for them is known."""
+    kept = {f"numbers {name}": numbers_json(figure) for name, figure in still.items()}
+    text = _fill(page, [*figures])
+    room = LARGEST - len(text.encode()) - sum(map(len, kept.values()))
+    for name, trace in _thin_figures(zooms, room).items():
+        kept[f"numbers {name}"] = numbers_json(trace)
+        kept[f"note {name}"] = thinning_note(zooms[name].samples, trace.samples)
     parts = text.split(SIGN)
-    for i in range(1, len(parts), 2):
-        part, _, name = parts[i].partition(" ")
-        parts[i] = kept[name][part == "note"]
-    return "".join(parts)
+    parts[1::2] = [
+        kept.get(part, "") for part in parts[1::2]
+    ]  # in place of the signs of `_fill`; still ones have no note
+    return "".join(parts).encode()
 
 
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
