@@ -1,12 +1,13 @@
 """What all records have in common, and records read back: whole, or column by column where they are long."""
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from davinci_forces.errors import BadRecord
-from davinci_forces.records import KINDS, PeriodResidual, store
+from davinci_forces.records import KINDS, PeriodResidual, by_name, store
 
 ROWS = 1000
 
@@ -57,3 +58,22 @@ def test_a_column_of_a_long_record_that_is_gone_is_said_when_it_is_asked_for(wri
     (folder / place).write_bytes(b"PAR1")
     with pytest.raises(BadRecord, match=r"joint\.parquet: not a PeriodResidual"):
         _ = later.tau_noise
+
+
+def test_a_record_takes_what_is_not_given_from_the_first_source_that_has_it(written):
+    folder, place, record = written
+    later = store.read(PeriodResidual, folder, place, longest=1)
+    first = SimpleNamespace(joint="another", q_noise=np.zeros(ROWS), unit="m")
+    for source in (record, later):
+        made = PeriodResidual.like(first, source, tau_noise=np.ones(ROWS))
+        assert (made.log, made.joint) == ("log", "another")
+        np.testing.assert_array_equal(made.q_noise, np.zeros(ROWS))
+        np.testing.assert_array_equal(made.dq_noise, record.dq_noise)
+        np.testing.assert_array_equal(made.tau_noise, np.ones(ROWS))
+
+
+def test_records_are_grouped_in_the_order_in_which_names_first_occur(written):
+    _, _, record = written
+    again = replace(record, log="b"), replace(record, log="a"), replace(record, log="b")
+    assert by_name(again, "log") == {"b": [again[0], again[2]], "a": [again[1]]}
+    assert list(by_name(again, "log")) == ["b", "a"]

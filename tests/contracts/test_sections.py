@@ -37,7 +37,6 @@ from davinci_forces.report.content import (
     Listing,
     Number,
     OnScreen,
-    Points,
     Prose,
     Section,
     Table,
@@ -46,6 +45,7 @@ from davinci_forces.report.content import (
     walk,
 )
 from davinci_forces.report.content.layout import number_blocks
+from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (

@@ -6,7 +6,8 @@ import numpy as np
 
 from davinci_forces.records import HapticResponse, HapticRun, Origin, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.report.content import Figure, OnScreen, Section, VSpan, walk
+from davinci_forces.report.content import Figure, OnScreen, Section, walk
+from davinci_forces.report.content.marks import VSpan
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
 from davinci_forces.report.sections import haptics

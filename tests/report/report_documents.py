@@ -3,34 +3,36 @@
 import numpy as np
 
 from davinci_forces.report.content import (
-    Band,
-    Bars,
     Bullets,
     Document,
     Equation,
     Figure,
     Figure3D,
+    Listing,
+    Number,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    literal,
+)
+from davinci_forces.report.content.marks import (
+    Band,
+    Bars,
     HBand,
     Histogram,
     HLine,
     Line,
     Line3D,
-    Listing,
-    Number,
-    OnScreen,
-    Panel,
     Points,
     Points3D,
-    Prose,
     Reference,
-    Section,
     Stems,
-    Table,
     Tiles,
-    Verdict,
     VLine,
     VSpan,
-    literal,
 )
 
 HOSTILE = "<script>alert(1)</script> #set page() $x$ *b* **c** `d` [@e] \\ \"q\" 'a' & é Ω"

@@ -8,7 +8,7 @@ import pytest
 
 from davinci_forces.records import Fit, FrictionMap, Origin, Residual, SwarmSearch
 from davinci_forces.records.catalogue import Catalogue
-from davinci_forces.report.content import Line
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
 from davinci_forces.report.sections.joints.estimators import convergence, estimators

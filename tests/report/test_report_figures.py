@@ -18,7 +18,8 @@ from matplotlib.textpath import TextPath
 from report_documents import HOSTILE, still, zoomable
 
 from davinci_forces.report import writers
-from davinci_forces.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Points, Tiles, walk
+from davinci_forces.report.content import Document, Figure, Figure3D, Panel, walk
+from davinci_forces.report.content.marks import Histogram, Line, Points, Tiles
 from davinci_forces.report.figures.palette import COLOURS
 from davinci_forces.report.figures.panels import wrap_label
 from davinci_forces.report.figures.svg import svg

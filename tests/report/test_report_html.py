@@ -15,18 +15,8 @@ import numpy as np
 import pytest
 from report_documents import HOSTILE, document, zoomable
 
-from davinci_forces.report.content import (
-    Document,
-    Equation,
-    Figure,
-    Line,
-    Number,
-    OnScreen,
-    Panel,
-    Prose,
-    Section,
-    Table,
-)
+from davinci_forces.report.content import Document, Equation, Figure, Number, OnScreen, Panel, Prose, Section, Table
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.writers import html
 from davinci_forces.report.writers.numbers import CODES, numbers_json
 from davinci_forces.report.writers.typesetting import NotTypeset
@@ -237,7 +227,11 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things() -> None:
     """They share their names, and of two functions of one name a page has the last."""
     scripts = (*html.SCRIPTS, *html.TRACE_SCRIPTS, *html.REVIEW_SCRIPTS)
     outermost = re.compile(r"^(?:async )?(?:function|class|const|let|var) (\w+|\[[^]]*\]|\{[^}]*\})", re.MULTILINE)
-    found = [re.findall(r"\w+", name) for script in scripts for name in outermost.findall(html._script(script))]
+    found = [
+        re.findall(r"\w+", name)
+        for script in scripts
+        for name in outermost.findall((html.TEMPLATES / script).read_text())
+    ]
     names = Counter(name for each in found for name in each)
     assert len(names) > 50
     assert [name for name, times in names.items() if times > 1] == []

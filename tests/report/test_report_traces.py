@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import zoomable
 
-from davinci_forces.report.content import MAX_POINTS_OF_MARK, Band, Figure, Line, Panel, Points
+from davinci_forces.report.content import MAX_POINTS_OF_MARK, Figure, Panel
+from davinci_forces.report.content.marks import Band, Line, Points
 from davinci_forces.report.content.thinning import envelope, thin_mark
 from davinci_forces.report.writers.numbers import thin_figure, thinning_note
 

@@ -38,6 +38,7 @@ from davinci_forces.records.record import (
     Names,
     Origin,
     Record,
+    by_name,
     diagnostic,
     first_of_each_kind,
 )
@@ -75,7 +76,7 @@ __all__ = [
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
     "TipBudget", "TipContact", "TipForce", "TissueModel", "TorqueConstant", "Touch", "Track", "Trajectory",
-    "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic", "first_of_each_kind",
+    "Tuning", "Weight", "Whiteness", "Workspace", "by_name", "diagnostic", "first_of_each_kind",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -84,12 +85,10 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Motion, Average,
         PeriodResidual, Trajectory, Spectrum, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
-        FreeMotion,
-        ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
-        TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion, HapticResponse,
-        HapticRun,
-        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
-        Explanation, Diagnostic,
+        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
+        FreeWeight, TorqueConstant, Comparison, Streamed, StreamLevel, StabilityLimit, HandLimit, HapticMotion,
+        HapticResponse, HapticRun, JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce,
+        Whiteness, Innovation, Explanation, Diagnostic,
     )
 }  # fmt: skip
 

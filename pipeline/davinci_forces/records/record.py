@@ -76,11 +76,14 @@ class Record:
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
 
     @classmethod
-    def like(cls, source: object, **others: Any) -> Self:
-        """Return a record of other values, and for the rest the attributes of these names of a source.
+    def like(cls, *sources: object, **others: Any) -> Self:
+        """Return a record of other values, and for the rest the attributes of sources, the first ones preferred.
 
-        A record with columns of a lazy source is lazy, too.
+        A record with columns of a lazy source is lazy, too; such a source is the last one.
         """
+        *preferred, source = sources
+        for each in reversed(preferred):
+            others = {f.name: getattr(each, f.name) for f in fields(cls) if hasattr(each, f.name)} | others  # type: ignore[arg-type]
         if isinstance(source, Record) and "_read" in vars(source) and not others.keys() >= {*cls.columns()}:
             scalars = {name: others[name] if name in others else getattr(source, name) for name in cls.scalars()}
             read = vars(source)["_read"]
@@ -239,6 +242,14 @@ class Diagnostic(Record):
     subject: str
     severity: Labels
     text: Labels
+
+
+def by_name(records: Iterable[AnyRecord], scalar: str) -> dict[str, list[AnyRecord]]:
+    """Group records by the value of a scalar, as by their joint, in the order in which the values first occur."""
+    groups: dict[str, list[AnyRecord]] = {}
+    for record in records:
+        groups.setdefault(getattr(record, scalar), []).append(record)
+    return groups
 
 
 def first_of_each_kind(remarks: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:

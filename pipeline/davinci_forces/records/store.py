@@ -66,7 +66,8 @@ class Writer:
         if place not in self._open:
             target = self.folder / place
             target.parent.mkdir(parents=True, exist_ok=True)
-            described = schema(type(record), self.unit(record))
+            units = tuple(self.unit(record)(QUANTITIES[name].unit) for name in record.columns())
+            described = schema(type(record), units)  # type: ignore[arg-type]  # a class is hashable
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
         described = self._open[place].schema
         columns = {f.name: _column(getattr(record, f.name), f.type) for f in described}
@@ -105,13 +106,9 @@ class Writer:
         return sorted(self._open)
 
 
-def schema(kind: type[Record], unit: Unit) -> pa.Schema:
-    """Return the columns of a record, each with its meaning and unit."""
-    return _schema(kind, tuple(unit(QUANTITIES[name].unit) for name in kind.columns()))  # type: ignore[arg-type]  # a class is hashable
-
-
 @cache
-def _schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
+def schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
+    """Return the columns of a record, each with its meaning and unit."""
     types: dict[str, Any] = {f.name: f.type for f in fields(kind)}  # type: ignore[arg-type]
     return pa.schema(
         pa.field(name, ARROW[types[name]], nullable=False, metadata={"meaning": QUANTITIES[name].meaning, "unit": unit})

@@ -104,8 +104,7 @@ def partners(before: Mapping[str, Window], after: Mapping[str, Window]) -> dict[
 def windows_of(numbers: Mapping[str, StatedValue]) -> dict[str, Window]:
     """Onset and release [s] of every contact, by the start of its keys."""
     names = [key.removesuffix(".release") for key in numbers if key.endswith(".release")]
-    onset, release = ([numbers[f"{name}.{which}"].number or 0.0 for name in names] for which in ("onset", "release"))
-    return dict(zip(names, zip(onset, release, strict=True), strict=True))
+    return {name: (numbers[f"{name}.onset"].number or 0.0, numbers[f"{name}.release"].number or 0.0) for name in names}
 
 
 def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:

@@ -79,11 +79,6 @@ class Context:
         fits = [f for f in self.catalogue.records(Fit) if f"{f.model}.{f.estimator}" == name]
         return next((f for f in fits if joint in self.efforts_of(f)), None)
 
-    def used_predictions(self, joint: str) -> list[Prediction]:
-        """The predictions of a joint's effort by the fit that the filter used."""
-        predictions, used = self.catalogue.select(Prediction, joint=joint), self.used_fit(joint)
-        return [p for p in predictions if f"{p.model}.{p.estimator}" == used]
-
     def efforts_of(self, fit: Fit) -> list[str]:
         """The joints whose efforts a fit describes, in their order."""
         names = [joint.name for joint in self.study.robot.joints]
@@ -136,8 +131,8 @@ def estimator_name(estimator: str) -> str:
 
 
 def count(number: int, noun: str) -> str:
-    """A number with its noun: '1 run', '3 runs'."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    """A number with its noun: '1 run', '3 runs', '2 pushes'."""
+    return f"{number} {noun}{'' if number == 1 else 'es' if noun.endswith('sh') else 's'}"
 
 
 def title(name: str) -> str:

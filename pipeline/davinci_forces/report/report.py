@@ -35,20 +35,18 @@ def write_report(
 ) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance, ratings, baseline=baseline)
-    built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
-    numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
-    numbers["summary.json"] = digest(context)
+    built = {name: (title, parts) for name, (title, names) in DOCUMENTS.items() if (parts := sections(context, names))}
+    answers = {"summary.txt": answer(context).encode(), "summary.json": digest(context)}
+    numbers = {"results.json": context.results.json(), **answers}
     listed = manifest(provenance, numbers)
     report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
     edition = f"report ID {report_id} · davinci-forces {provenance.version}, code {provenance.code}{dates(catalogue)}"
     rated = Rated(results, report_id, tuple(log.name for log in study.logs), ratings)
     documents = []
-    for name, (title, content) in built.items():
-        others = [(heading, f"{other}.html") for other, (heading, parts) in built.items() if parts and other != name]
-        links = (*others, ("Numbers", "results.json"))
-        asked = rated if name == "report" else None
-        if content:
-            documents.append(Document(title, study.title, study.simulated, content, edition, name, links, rated=asked))
+    for name, (title, parts) in built.items():
+        others = [(heading, f"{other}.html") for other, (heading, _) in built.items() if other != name]
+        links, asked = (*others, ("Numbers", "results.json")), rated if name == "report" else None
+        documents.append(Document(title, study.title, study.simulated, parts, edition, name, links, rated=asked))
     return render_all(tuple(documents)) | numbers | {MANIFEST: listed, "references.bib": bibliography().encode()}
 
 
@@ -63,8 +61,8 @@ def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
     built: list[Section] = []
     for name in names:
         labels = {label for section in built for block in walk(section) if (label := name_of(block))}
-        section = section_builder(name)(replace(context, labels=frozenset(labels)))
-        built += [section] if section is not None else []
+        if section := section_builder(name)(replace(context, labels=frozenset(labels))):
+            built.append(section)
     return tuple(built)
 
 

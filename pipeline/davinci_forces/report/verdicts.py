@@ -208,10 +208,9 @@ def band(coverage: float) -> Level:
 
 def band_in_words(coverage: float, coverage_std: float = 0.0) -> str:
     """Whether a 95 % band that covers this share of free-space samples is too narrow, surely too wide or neither."""
-    surely_wide = coverage - NORMAL_95 * coverage_std > 0.95
-    return {"bad": "too narrow", "info": "too wide" if surely_wide else "wide enough"}.get(
-        band(coverage), "wide enough"
-    )
+    if band(coverage) == "info" and coverage - NORMAL_95 * coverage_std > 0.95:
+        return "too wide"
+    return "too narrow" if band(coverage) == "bad" else "wide enough"
 
 
 def percent(share: float) -> str:

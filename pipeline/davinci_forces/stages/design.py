@@ -58,21 +58,16 @@ def links(robot: Robot, chain: Chain, worst_condition: float) -> Links:
     names = np.array(chain.names, object)
     link_masses = np.full(len(chain.links), np.nan) if robot.bodies is None else robot.bodies.masses
     masses = dict(zip(chain.links, link_masses.tolist(), strict=True))
+    parameters = np.array([row[2:6] for row in chain.table] or [(np.nan,) * 4] * (len(chain.names) - 1)).T
     return Links(
         robot=robot.name,
         worst_condition=worst_condition,
         link=names[1:],
         parent=names[chain.before][1:],
-        **dh_parameters(chain),
+        **dict(zip(("alpha", "a", "d", "offset"), parameters, strict=True)),
         moved_by=chain.moved_by[1:] + 1,
         mass=np.array([masses.get(name, 0.0) for name in chain.names[1:]]),
     )
-
-
-def dh_parameters(chain: Chain) -> dict[str, Column]:
-    """The parameters of the frames after the base from the robot's table; NaN without a table."""
-    rows = np.array([row[2:6] for row in chain.table] or [(np.nan,) * 4] * (len(chain.names) - 1))
-    return dict(zip(("alpha", "a", "d", "offset"), rows.T, strict=True))
 
 
 def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Lyapunov]:

@@ -1,6 +1,5 @@
 """Estimate the mass on the arm from the joint efforts of a weight log, and torque constants from a known mass."""
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -35,7 +34,10 @@ from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, TorqueConstant, Weight, diagnostic
+from davinci_forces.records.prediction import JointModel
+from davinci_forces.records.record import Diagnostic, by_name, diagnostic
+from davinci_forces.records.recordings import Motion
+from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 
@@ -178,16 +180,13 @@ def gather(
     Joints whose effort is in A are left out, because a current is not a force.  A known mass gives the torque constant
     of each joint whose current was measured.
     """
-    by_weight = defaultdict(list)
-    for load in loads:
-        if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD:
-            by_weight[load.weight, load.log].append(load)
-    units = {joint.name: joint.unit("{effort}") for joint in robot.joints}
+    usable = [load for load in loads if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD]
     for weighing in weighings.each:
-        carrying = by_weight[weighing.log, weighing.log]
-        logs = {log: ls for (weight, log), ls in by_weight.items() if weight == weighing.log and log != weighing.log}
-        tare, fault = subtract_tare(carrying, logs.get(weighing.tare, [])) if weighing.tare and carrying else ([], "")
-        yield from torque_constants(weighing, carrying, tare, logs, robot)
+        carrying = [load for load in usable if load.weight == weighing.log == load.log]
+        others = [load for load in usable if load.weight == weighing.log != load.log]
+        of_tare = [load for load in others if load.log == weighing.tare]
+        tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
+        yield from torque_constants(weighing, carrying, tare, others, robot)
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
             message = f"{weighing.log}: no moving joint carries the mass on {weighing.weight.moves_with}"
@@ -200,11 +199,11 @@ def gather(
         if fault:
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
-        yield from estimate_mass(weighing, weight_loads, tare, logs, units)
+        yield from estimate_mass(weighing, weight_loads, tare, others, robot)
 
 
 def torque_constants(
-    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], robot: Robot
+    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot
 ) -> Iterator[TorqueConstant | Diagnostic]:
     """Propose the torque constant of each joint whose current was measured, so that it carries the known mass.
 
@@ -213,7 +212,7 @@ def torque_constants(
     """
     for i, load in enumerate(loads if weighing.weight.mass else ()):
         joint = robot.joint(load.joint)
-        same = [other for ls in logs.values() for other in ls if other.joint == load.joint and not tare]
+        same = [other for other in others if other.joint == load.joint and not tare]
         parts = [tare[i] if tare else load, *filter(None, map(unseen_part, same))]
         run, *free = (fit_mass(rows_of([part], {}, "load")) for part in parts)
         apparent = MassEstimate(run.mass, pooled_std(run, free))
@@ -257,10 +256,10 @@ class FreeMotionErrors(NamedTuple):
 
 
 def estimate_mass(
-    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], units: dict[str, str]
+    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot
 ) -> Iterator[Weight | FreeWeight | Diagnostic]:
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
-    free = free_motion_errors(loads, logs)
+    free = free_motion_errors(loads, others)
     loads = tare or loads
     sides = [rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
     joints = [load.joint for load in loads]
@@ -276,7 +275,7 @@ def estimate_mass(
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
     left = np.array([root_mean_square(residual(row, mass)) for row in sides[0]])
-    tare_mass = free.masses.get(weighing.tare, MassEstimate(float("nan"), float("nan"))) if tare else None
+    tare_mass = free.masses.get(weighing.tare if tare else "", MassEstimate(float("nan"), float("nan")))
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
         yield diagnostic(
@@ -289,9 +288,8 @@ def estimate_mass(
         differing=differing, mass_mirrored=mass_mirrored,
         mass_mirrored_std=widen(mirrored_std, mass_mirrored, alone[1], mirrored_test),
         side=side_of(better(*sides), mass_mirrored), mass_scale=mass / stated, mass_scale_std=std / stated,
-        tare_mass=tare_mass.mass if tare_mass else float("nan"),
-        tare_mass_std=total_std(tare_mass, free) if tare_mass else float("nan"),
-        loaded=np.array(joints, object), unit=np.array([units[joint] for joint in joints], object),
+        tare_mass=tare_mass.mass, tare_mass_std=total_std(tare_mass, free), loaded=np.array(joints, object),
+        unit=np.array([robot.joint(joint).unit("{effort}") for joint in joints], object),
         mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
         mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
         false_mass=false, joint_offset=np.array([offset(row, mass) for row in sides[0]]),
@@ -340,7 +338,7 @@ def total_std(mass: MassEstimate, free: FreeMotionErrors) -> float:
     return free.widening * float(np.hypot(mass.std, free.fit_std))
 
 
-def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]) -> FreeMotionErrors:
+def free_motion_errors(weight_loads: Sequence[Load], others: Sequence[Load]) -> FreeMotionErrors:
     """Compute the errors of a mass from free motion that the fit has not seen.
 
     The error of a joint is the mass that it alone shows in free motion, at the speeds of these logs; there are refits
@@ -349,13 +347,9 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     widens all errors.
     """
     joints = {load.joint for load in weight_loads}
-    unseen = {
-        log: [part for load in ls if load.joint in joints and (part := unseen_part(load))] for log, ls in logs.items()
-    }
-    unseen = {log: ls for log, ls in unseen.items() if ls}
-    by_joint: dict[str, list[Rows]] = defaultdict(list)
-    for load in (load for ls in unseen.values() for load in ls):
-        by_joint[load.joint] += rows_of([load], {}, "load")
+    unseen = list(filter(None, (unseen_part(load) for load in others if load.joint in joints)))
+    by_log = by_name(unseen, "log")
+    by_joint = {joint: rows_of(ls, {}, "load") for joint, ls in by_name(unseen, "joint").items()}
     sigma = {joint: model_errors(rows) for joint, rows in by_joint.items()}
     sigma_std = {
         joint: root_mean_square(np.concatenate([residual(row, 0.0) for row in rows]))[1]
@@ -364,8 +358,8 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     for load in weight_loads:  # a joint without free motion gets the residual of its weight log
         [row] = rows_of([load], {}, "load")
         sigma.setdefault(load.joint, float(np.std(residual(row, fit_mass([row]).mass))))
-    roles = {log: ls[0].role for log, ls in unseen.items()}
-    rows = {log: rows_of(ls, sigma, "load") for log, ls in unseen.items()}
+    roles = {log: ls[0].role for log, ls in by_log.items()}
+    rows = {log: rows_of(ls, sigma, "load") for log, ls in by_log.items()}
     masses = {log: fit_mass(log_rows) for log, log_rows in rows.items()}
     fitted = [row for log, log_rows in rows.items() if roles[log] == "identification" for row in log_rows]
     of_fitted = fit_mass(fitted) if fitted else MassEstimate(0.0, 0.0)

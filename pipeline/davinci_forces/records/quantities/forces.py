@@ -2,6 +2,8 @@
 
 from davinci_forces.records.quantities.models import PER_ROW, Quantity
 
+PAIRS = (("x", "y"), ("x", "z"), ("y", "z"))  # of axes
+
 FORCES = {
     # filtering
     "tau_ext": Quantity("external effort that the robot exerts on the environment", "{effort}"),
@@ -70,15 +72,11 @@ FORCES = {
     "free_error": Quantity("root mean square of the model's error in free motion", PER_ROW),
     "free_mass": Quantity("apparent mass in a log of free motion", "kg"),
     # the force at the tip
-    "f_x": Quantity("force at the tip along x0, that the robot exerts on the environment", "N"),
-    "f_y": Quantity("force at the tip along y0, that the robot exerts on the environment", "N"),
-    "f_z": Quantity("force at the tip along z0, that the robot exerts on the environment", "N"),
-    "c_xx": Quantity("variance of the force at the tip along x0", "N^2"),
-    "c_yy": Quantity("variance of the force at the tip along y0", "N^2"),
-    "c_zz": Quantity("variance of the force at the tip along z0", "N^2"),
-    "c_xy": Quantity("covariance of the force at the tip along x0 and y0", "N^2"),
-    "c_xz": Quantity("covariance of the force at the tip along x0 and z0", "N^2"),
-    "c_yz": Quantity("covariance of the force at the tip along y0 and z0", "N^2"),
+    **{
+        f"f_{a}": Quantity(f"force at the tip along {a}0, that the robot exerts on the environment", "N") for a in "xyz"
+    },
+    **{f"c_{a}{a}": Quantity(f"variance of the force at the tip along {a}0", "N^2") for a in "xyz"},
+    **{f"c_{a}{b}": Quantity(f"covariance of the force at the tip along {a}0 and {b}0", "N^2") for a, b in PAIRS},
     "near_singular": Quantity("1 where the tip's Jacobian has a condition number above 100, else 0"),
     "near_share": Quantity("share of samples at which the tip's Jacobian has a condition number above 100"),
     "median_condition": Quantity("median condition number of the tip's Jacobian"),
@@ -91,17 +89,13 @@ FORCES = {
     "rho_23": Quantity("correlation of the errors of the second and the third joint"),
     "correlation_from": Quantity("logs that give the correlation of joint errors; none where it is taken as 0", ""),
     "t_peak": Quantity("time of the largest force at the tip", "s"),
-    "f_x_std": Quantity("standard deviation of the force at the tip along x0", "N"),
-    "f_y_std": Quantity("standard deviation of the force at the tip along y0", "N"),
-    "f_z_std": Quantity("standard deviation of the force at the tip along z0", "N"),
+    **{f"f_{a}_std": Quantity(f"standard deviation of the force at the tip along {a}0", "N") for a in "xyz"},
     "f_peak": Quantity("largest force at the tip of the contact", "N"),
     "f_peak_std": Quantity("standard deviation of that force along itself", "N"),
     "sigma_1": Quantity("longest half-axis of the force's sigma ellipsoid", "N"),
     "sigma_2": Quantity("middle half-axis of the force's sigma ellipsoid", "N"),
     "sigma_3": Quantity("shortest half-axis of the force's sigma ellipsoid", "N"),
-    "weak_x": Quantity("component along x0 of the direction of largest uncertainty"),
-    "weak_y": Quantity("component along y0 of the direction of largest uncertainty"),
-    "weak_z": Quantity("component along z0 of the direction of largest uncertainty"),
+    **{f"weak_{a}": Quantity(f"component along {a}0 of the direction of largest uncertainty") for a in "xyz"},
     "of_joint": Quantity("joint that contributes the error", ""),
     "lever": Quantity("force at the tip that corresponds to one unit of the joint's effort", "N per unit of effort"),
     "filter_force": Quantity("part of the force error from noise and the random walk of the effort, of one joint", "N"),

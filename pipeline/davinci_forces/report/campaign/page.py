@@ -4,33 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.report.campaign.studies import (
-    FLOORS,
-    CampaignStudy,
-    Findings,
-    Series,
-    by_robot,
-    joints_of,
-    series_key,
-)
-from davinci_forces.report.content import (
-    Band,
-    Block,
-    Bullets,
-    Cell,
-    Document,
-    Figure,
-    HLine,
-    Number,
-    Panel,
-    Points,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-    literal,
-)
-from davinci_forces.report.content.marks import AnyMark
+from davinci_forces.report.campaign.studies import FLOORS, CampaignStudy, Findings, Series, by_robot, joints_of
+from davinci_forces.report.content import Block, Bullets, Cell, Document, Figure, Panel, Prose, Section, Table, Verdict
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import AnyMark, Band, HLine, Points
+from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import count, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.verdicts import band, verdict_words
@@ -68,7 +46,7 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
         yield Verdict("info", f"Left out, as they have no results: {names}. Run `davinci-forces all` on them.")
-    changes = [series for series in findings.every if series_key(series) in {*findings.slopes, *findings.varying}]
+    changes = [series for series in findings.every if series.key in {*findings.slopes, *findings.varying}]
     messages = [change_in_words(series, findings) for series in changes]
     for series in findings.every:
         for i in findings.stand_out(series):
@@ -90,7 +68,7 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
 def change_in_words(series: Series, findings: Findings) -> str:
     """State how a number drifts or varies."""
     name = f"**{where(series)}**"
-    if line := findings.slopes.get(series_key(series)):
+    if line := findings.slopes.get(series.key):
         slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
@@ -180,7 +158,7 @@ def panel(series: Series, findings: Findings) -> Panel:
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(series.std)
     marks: list[AnyMark] = []
-    if limits := findings.limits.get(series_key(series)):
+    if limits := findings.limits.get(series.key):
         marks.append(Band(t[inside], limits.centre - limits.width, limits.centre + limits.width, "", "grey"))
         marks.append(HLine(limits.centre, "", "grey", "solid"))
     if inside:

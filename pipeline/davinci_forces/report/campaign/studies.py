@@ -52,6 +52,10 @@ class CampaignStudy:
         return f"[{words}]({self.report})"
 
 
+DAY = 86400.0  # [s]
+Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
+
+
 class Series(NamedTuple):
     """One number of a robot's joint over the studies that have it, with the standard errors."""
 
@@ -63,6 +67,11 @@ class Series(NamedTuple):
     keys: tuple[str, ...]
     value: Array
     std: Array  # NaN where none is stated
+
+    @property
+    def key(self) -> Place:
+        """Robot, joint, name and unit, which identify a series."""
+        return self[:4]
 
 
 def by_robot(studies: Sequence[CampaignStudy]) -> dict[str, list[CampaignStudy]]:
@@ -99,10 +108,6 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
         std = np.array([number.std or np.nan for number in numbers])
         those, keys = zip(*places, strict=True)
         yield Series(studies[0].robot, joint, name, unit, those, keys, value, std)
-
-
-DAY = 86400.0  # [s]
-Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
 
 
 class Slope(NamedTuple):
@@ -145,13 +150,8 @@ class Findings:
 
     def stand_out(self, one: Series) -> tuple[int, ...]:
         """Indices of the studies of a series that stand out."""
-        return self.outliers.get(series_key(one), ())
+        return self.outliers.get(one.key, ())
 
     def has_change(self, one: Series) -> bool:
         """Whether a series drifts, varies or has studies that stand out."""
-        return series_key(one) in self.slopes or series_key(one) in self.varying or bool(self.stand_out(one))
-
-
-def series_key(one: Series) -> Place:
-    """Robot, joint, name and unit, which identify a series."""
-    return one.robot, one.joint, one.name, one.unit
+        return one.key in self.slopes or one.key in self.varying or bool(self.stand_out(one))

@@ -12,32 +12,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, TypeVar
 
 from davinci_forces.report.content.inline import literal, printable
-from davinci_forces.report.content.marks import (
-    AnyMark,
-    Band,
-    Bars,
-    HBand,
-    Histogram,
-    HLine,
-    Line,
-    Line3D,
-    Points,
-    Points3D,
-    Reference,
-    Stems,
-    Tiles,
-    VLine,
-    VSpan,
-)
+from davinci_forces.report.content.marks import AnyMark, Line3D, Points3D
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.content.thinning import points_of, thin_mark
 from davinci_forces.study.review import Rating
 
 __all__ = [
-    "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
-    "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "OnScreen", "Panel", "Points", "Points3D",
-    "Prose", "Rated", "Reference", "Section", "Stems", "Table", "Tiles", "VLine", "VSpan", "Verdict", "literal",
-    "name_of", "walk",
+    "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "Level", "Listing", "Number", "OnScreen",
+    "Panel", "Prose", "Rated", "Section", "Table", "Verdict", "literal", "name_of", "walk",
 ]  # fmt: skip
 
 Cell = str | Number

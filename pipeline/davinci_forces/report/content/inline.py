@@ -40,14 +40,11 @@ def printable(text: str) -> str:
 
 def parse(text: str) -> tuple[Span, ...]:
     """Split marked text into spans; a mark without its partner is text."""
-    spans: list[Span] = []
-    place = 0
+    spans, place = list[Span](), 0
     for match in MARK.finditer(text):
-        spans.append(Span("text", text[place : match.start()]))
-        spans.append(_span(match))
+        spans += [Span("text", text[place : match.start()]), _span(match)]
         place = match.end()
-    spans.append(Span("text", text[place:]))
-    return _joined(spans)
+    return _joined([*spans, Span("text", text[place:])])
 
 
 def _span(match: re.Match[str]) -> Span:

@@ -5,33 +5,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from davinci_forces.report.content import (
-    Block,
-    Bullets,
-    Cell,
-    Document,
-    Equation,
-    Figure,
-    Figure3D,
-    Listing,
-    OnScreen,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-    name_of,
-    walk,
-)
+from davinci_forces.report import content
+from davinci_forces.report.content import Block, Cell, Document, Equation, Figure, Figure3D, OnScreen, Section, Table
 from davinci_forces.report.content.inline import Kind, literal, parse
 from davinci_forces.report.content.number import Number
 
 KINDS: dict[type, str] = {Figure: "figure", Figure3D: "figure", Table: "table", Equation: "equation"}
 NUMBERED_LABELS = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
 TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
-    Prose: lambda prose: (prose.text,),
-    Bullets: lambda bullets: bullets.items,
-    Listing: lambda listing: (),
-    Verdict: lambda verdict: (verdict.text,),
+    content.Prose: lambda prose: (prose.text,),
+    content.Bullets: lambda bullets: bullets.items,
+    content.Listing: lambda listing: (),
+    content.Verdict: lambda verdict: (verdict.text,),
     Equation: lambda equation: (),
     Table: lambda table: (table.caption, *table.header, *(c for row in table.rows for c in row if isinstance(c, str))),
     Figure: lambda figure: (figure.caption,),
@@ -59,7 +44,7 @@ def number_blocks(document: Document) -> tuple[Placed, ...]:
 
     Raises ValueError if references lead nowhere, with all of their labels.
     """
-    named = {name_of(block) for block in walk(document)}
+    named = {content.name_of(block) for block in content.walk(document)}
     if missing := sorted(set(marked_texts(document, "reference")) - named):
         raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
     counters: Counter[str] = Counter()
@@ -77,7 +62,7 @@ def references(placed: tuple[Placed, ...]) -> dict[str, str]:
     """What a reference to each label or anchor prints: {'roll-residual': 'Figure 3'}."""
     printed: dict[str, str] = {}
     for item in flatten(placed):
-        if item.number and name_of(item.block):
+        if item.number and content.name_of(item.block):
             printed[item.anchor] = NUMBERED_LABELS[item.kind].format(item.number)
         elif isinstance(item.block, OnScreen):
             printed[item.anchor] = f"“{''.join(span.text for span in parse(item.block.title))}”"
@@ -92,7 +77,7 @@ def on_screen(placed: tuple[Placed, ...]) -> frozenset[str]:
 
 def marked_texts(document: Document, kind: Kind) -> Iterator[str]:
     """The contents of the inline marks of one kind, in all texts of a document."""
-    for block in walk(document):
+    for block in content.walk(document):
         for text in TEXTS[type(block)](block):
             yield from (span.text for span in parse(text) if span.kind == kind)
 
@@ -119,7 +104,7 @@ def _block(block: Block, counters: Counter[str], series: str) -> Placed:
     counters[series + kind] += 1
     number = f"{series}{counters[series + kind]}"
     # A capital letter cannot be confused with a label, which has none.
-    return Placed(block, kind, number, name_of(block) or f"{kind.capitalize()}-{number}")
+    return Placed(block, kind, number, content.name_of(block) or f"{kind.capitalize()}-{number}")
 
 
 NO_BREAK = "\N{NO-BREAK SPACE}"

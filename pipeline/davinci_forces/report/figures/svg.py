@@ -15,6 +15,7 @@ from davinci_forces.report.figures.panels import (
     TICK,
     Heading,
     PlacedPanel,
+    lines_of,
     place_panels,
     plan_heading,
 )
@@ -90,48 +91,45 @@ def draw_axes(panel: PlacedPanel, frame: Frame) -> str:
     for share, number in numbers_within(panel.x):
         x = frame.left + share * frame.width
         d += f"M{x:.2f} {bottom:.2f}v{TICK_LENGTH:g}"
-        text += lines(x, bottom + (TICK + NUMBERS / 2) * POINT, number, WORDS, SMALL_SIZE, NUMBERS)
+        text += lines(x, bottom + (TICK + NUMBERS / 2) * POINT, number, SMALL_SIZE, NUMBERS)
     for share, number in numbers_within(panel.y):
         y = bottom - share * frame.height
         d += f"M{frame.left:.2f} {y:.2f}h-{TICK_LENGTH:g}"
         text += words(frame.left - TICK_LENGTH - 3, y + BASELINE * SMALL_SIZE, number, WORDS, SMALL_SIZE, "end")
     below = bottom + (TICK + panel.x.lines * NUMBERS + LINE_HEIGHT / 2) * POINT
-    text += lines(middle, below, panel.x.label, WORDS, NORMAL_SIZE, LINE_HEIGHT)
-    labels = panel.y.label.split("\n")
-    for i, label in enumerate(reversed(labels)):
+    text += lines(middle, below, panel.x.label, NORMAL_SIZE)
+    for i, label in enumerate(reversed(panel.y.label.split("\n"))):
         x = panel.left - TICK - panel.y_numbers - (i + 0.4) * LINE_HEIGHT
         text += words(x * POINT, frame.top + frame.height / 2, label, WORDS, NORMAL_SIZE, "middle", turned=True)
     return path(d, stroke(AXES, 0.6)) + text
 
 
-def lines(x: float, y: float, text: str, colour: str, size: float, height: float) -> str:
-    """Lines of words, `height` [mm] apart, whose first one has its middle at (x, y) [pt]."""
+def lines(
+    x: float, y: float, text: str, size: float, height: float = LINE_HEIGHT, anchor: str = "middle", bold: bool = False
+) -> str:
+    """Lines of words, `height` [mm] apart, the first one with its anchor at x and its middle at y [pt]."""
     rows = enumerate(text.split("\n"))
-    return "".join(words(x, y + i * height * POINT + BASELINE * size, row, colour, size, "middle") for i, row in rows)
+    return "".join(
+        words(x, y + i * height * POINT + BASELINE * size, row, WORDS, size, anchor, bold) for i, row in rows
+    )
 
 
 def draw_heading(
     heading: Heading, marks: tuple[AnyMark | Line3D | Points3D, ...], left: float, bottom: float, width: float
 ) -> str:
     """Title and legend above axes whose upper left corner is at (left, bottom) and which are `width` wide [mm]."""
-    top, titles = bottom - heading.height + LINE_HEIGHT / 2 + 0.5, heading.title.split("\n") if heading.title else []
+    top, title_lines = bottom - heading.height + LINE_HEIGHT / 2 + 0.5, lines_of(heading.title) * bool(heading.title)
     shown = [mark for mark in marks if mark.label]
     widths = [SAMPLE + LETTER_WIDTH * len(mark.label) for mark in shown]
-    x, y = left, top + LINE_HEIGHT * len(titles) * (not heading.across)
+    x, y = left, top + LINE_HEIGHT * title_lines * (not heading.across)
     if heading.beside:
         x, y = left + width - sum(widths), y - LINE_HEIGHT
     svg, start = "", x
     for k, (mark, entry) in enumerate(zip(shown, heading.entries, strict=True)):
         svg += draw_sample(mark, x * POINT, y * POINT, DRAWN_SAMPLE * POINT)
-        rows = entry.split("\n")
-        for i, row in enumerate(rows):
-            below = (y + i * LINE_HEIGHT) * POINT + BASELINE * NORMAL_SIZE
-            svg += words((x + DRAWN_SAMPLE + 1.5) * POINT, below, row, WORDS, NORMAL_SIZE)
+        svg += lines((x + DRAWN_SAMPLE + 1.5) * POINT, y * POINT, entry, NORMAL_SIZE, anchor="start")
         x += widths[k] if heading.beside else max(widths)
         if not heading.beside and (k + 1) % heading.columns == 0:
-            x, y = start, y + LINE_HEIGHT * (len(rows) if heading.columns == 1 else 1)
-    top = bottom - 1.0 - LINE_HEIGHT * (len(titles) - 0.5) if heading.across else top
-    for i, row in enumerate(titles):
-        below = (top + i * LINE_HEIGHT) * POINT + BASELINE * TITLE_SIZE
-        svg += words(left * POINT, below, row, WORDS, TITLE_SIZE, bold=True)
-    return svg
+            x, y = start, y + LINE_HEIGHT * (lines_of(entry) if heading.columns == 1 else 1)
+    top = bottom - 1.0 - LINE_HEIGHT * (title_lines - 0.5) if heading.across else top
+    return svg + lines(left * POINT, top * POINT, heading.title, TITLE_SIZE, anchor="start", bold=True)

@@ -7,7 +7,8 @@ import numpy as np
 from davinci_forces.records import Choice, ModelSearch, Prediction
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Points, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import paper_or_screen, run_cells, section_of
 
@@ -80,22 +81,20 @@ def best_rows(choice: Choice) -> list[int]:
 
 
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
-    """Scores of candidates."""
+    """Scores of the candidates in these rows of a choice; the chosen one is bold."""
     header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Physical")
     caption += (
         " Relative errors: on blocks of path left out (raw samples), on the fitted data, and on periods left out. "
         "Physical: whether the inertia is positive definite along the trajectories."
     )
-    return Table(caption, header, tuple(row(context, choice, i) for i in rows), label, "lrrrrl")
-
-
-def row(context: Context, choice: Choice, i: int) -> tuple[Cell, ...]:
-    """The scores of one candidate; the chosen one is bold."""
-    name = literal(str(choice.candidate[i]))
-    key = f"choice.{choice.group}.{slug(str(choice.candidate[i]))}"
-    scores = context.numbers(key, ("score", "training", "over_periods"))
-    named = f"**{name}**" if choice.candidate[i] == choice.chosen else name
-    return named, context.count(f"{key}.parameters"), *scores, "yes" if choice.physical[i] else "no"
+    cells: list[tuple[Cell, ...]] = []
+    for i in rows:
+        name, physical = str(choice.candidate[i]), "yes" if choice.physical[i] else "no"
+        key = f"choice.{choice.group}.{slug(name)}"
+        scores = context.numbers(key, ("score", "training", "over_periods"))
+        named = f"**{literal(name)}**" if name == choice.chosen else literal(name)
+        cells.append((named, context.count(f"{key}.parameters"), *scores, physical))
+    return Table(caption, header, tuple(cells), label, "lrrrrl")
 
 
 def figure(choice: Choice) -> Figure:

@@ -8,7 +8,8 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Stiffness, Track, Weight
-from davinci_forces.report.content import Block, Cell, Figure, HBand, Number, Panel, Points, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, Number, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 from davinci_forces.study import LogEntry

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Control, Lyapunov
-from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Table, Verdict
+from davinci_forces.report.content import Block, Figure, Panel, Prose, Table, Verdict
+from davinci_forces.report.content.marks import HLine, Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import section_of
 from davinci_forces.robots.robot import ControlStudy

@@ -6,7 +6,8 @@ import numpy as np
 
 from davinci_forces import filters
 from davinci_forces.records import Comparison, FilterNoise, Streamed, Track
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Points, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import Line, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 
@@ -55,20 +56,16 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     """The tuned noise of each joint, and the logs of the tuning."""
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            title(noise.joint),
-            *context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau")),
-            literal(", ".join(noise.logs)),
-        )
-        for noise in noises
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for noise in noises:
+        numbers = context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau"))
+        rows.append((title(noise.joint), *numbers, literal(", ".join(noise.logs))))
     caption = (
         "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
         "per square root of a second."
     )
     header = ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on")
-    return Table(caption, header, rows, "filter-tuning", "lrrrrl")
+    return Table(caption, header, tuple(rows), "filter-tuning", "lrrrrl")
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
@@ -110,15 +107,10 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
     """Every log filtered as samples arrive, beside the smoother."""
     names, of_joint = ("stream_delay", "free_rms", "stream_loss", "peak_ratio"), ("alarm_level", "contacts_found")
-    rows = tuple(
-        (
-            title(s.joint),
-            literal(s.log),
-            *(context.number(f"stream.{s.log}.{s.joint}.{name}", 2) for name in names),
-            *(context.number(f"stream.{s.joint}.{name}", 2) for name in of_joint),
-        )
-        for s in logs
-    )
+    rows = []
+    for s in logs:
+        of_log = context.numbers(f"stream.{s.log}.{s.joint}", names, 2)
+        rows.append((*run_cells(s)[::-1], *of_log, *context.numbers(f"stream.{s.joint}", of_joint, 2)))
     caption = (
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
@@ -127,27 +119,23 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         "once in ten minutes. Contacts found: the number of measured contacts that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
-    return Table(caption, header, rows, "stream", "llrrrrrr")
+    return Table(caption, header, tuple(rows), "stream", "llrrrrrr")
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst run in free space of each joint."""
     names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
-    rows = tuple(
-        (
-            title(c.joint),
-            name_of(c.filter),
-            *(context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names),
-        )
-        for c in compared
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for c in compared:
+        numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
+        rows.append((title(c.joint), name_of(c.filter), *numbers))
     caption = (
         "Filters compared on each joint's worst run in free space. Each has the smallest random walk with which it "
         "follows a push. RMS and detection level: of the external effort in free motion. Peak ratio and delay: the "
         "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
     )
     header = ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay")
-    return Table(caption, header, rows, "filter-comparison", "llrrrr")
+    return Table(caption, header, tuple(rows), "filter-comparison", "llrrrr")
 
 
 def name_of(label: str) -> str:
@@ -173,19 +161,15 @@ def overlay(compared: list[Comparison]) -> Figure:
 
 def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     """What another delay would cost each joint."""
-    panels = tuple(
-        Panel(
-            title(n.joint), "delay [s]", label(n, "trial_std", "noise"),
-            (Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)), x_log=True,
-        )
-        for n in noises
-    )  # fmt: skip
+    panels = []
+    for n in noises:
+        marks = Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)
+        panels.append(Panel(title(n.joint), "delay [s]", label(n, "trial_std", "noise"), marks, x_log=True))
     return Figure(
-        f"Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown "
-        f"that late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
-        "",
+        "Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown that "
+        f"late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it.",
         f"Noise of the filter over its delay for {count(len(noises), 'joint')}.",
-        panels,
+        tuple(panels),
         "noise-over-delay",
         height=35,
     )

@@ -8,7 +8,8 @@ import numpy as np
 
 from davinci_forces.records import Fit, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, Line, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import first_on_paper, run_name, section_of
@@ -48,12 +49,11 @@ def section(context: Context) -> Iterator[Block]:
     errors: list[float] = []
     fitted = {fit.group for fit in context.own_fits()}
     for name, entry in context.study.truth.get("theta", {}).items():
-        if name in fitted:
-            yield from parameters(context, name, ("theta", name), entry, errors)
-            continue
-        for joint, values in entry.items():  # a model of several joints has a table for each
-            if joint in fitted:
-                yield from parameters(context, joint, ("theta", name, joint), values, errors)
+        is_joint = name in fitted  # a model of several joints has a table for each
+        tables = {(name,): entry} if is_joint else {(name, joint): values for joint, values in entry.items()}
+        for path, values in tables.items():
+            if path[-1] in fitted:
+                yield from parameters(context, ("theta", *path), values, errors)
     if errors:
         yield truth_verdict("Parameters", errors)
     figures: list[Figure] = []
@@ -106,10 +106,13 @@ def used_parameters(context: Context, joint: str) -> Iterator[tuple[str, str]]:
 
 
 def parameters(
-    context: Context, joint: str, path: tuple[str, ...], theta: dict[str, float], errors: list[float]
+    context: Context, path: tuple[str, ...], theta: dict[str, float], errors: list[float]
 ) -> Iterator[Table]:
-    """The estimated parameters of one joint, compared with the true ones; their errors are added to `errors`."""
-    sha256 = context.provenance.raw.get(f"raw/{context.study.name}/truth.toml", "")
+    """The estimated parameters of one joint, compared with the true ones; their errors are added to `errors`.
+
+    `path` leads to the true ones in truth.toml, and ends with the joint.
+    """
+    joint, sha256 = path[-1], context.provenance.raw.get(f"raw/{context.study.name}/truth.toml", "")
     rows = []
     for name, value in theta.items():
         estimate = context.results.get(f"fit.{joint}.{context.own_fit(joint)}.{slug(name)}")

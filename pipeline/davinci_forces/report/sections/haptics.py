@@ -6,8 +6,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HapticResponse, HapticRun
-from davinci_forces.report.content import Block, Figure, HLine, Line, OnScreen, Panel, Prose, VLine, VSpan
-from davinci_forces.report.content.marks import AnyMark
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
+from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine, VSpan
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
 

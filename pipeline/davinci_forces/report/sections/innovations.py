@@ -6,19 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
-from davinci_forces.report.content import (
-    AnyMark,
-    Block,
-    Cell,
-    Figure,
-    HBand,
-    Line,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    literal,
-)
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import AnyMark, HBand, Line
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
 
@@ -51,8 +40,7 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     )
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
-    drawn = [e for e in explained if (e.joint, e.log) in worst]
-    drawn.sort(key=lambda e: least_probability(e)[0])
+    drawn = sorted((e for e in explained if (e.joint, e.log) in worst), key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
     yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
@@ -117,22 +105,16 @@ def trials(e: Explanation) -> Table:
     """The results of the tests without each cause, the largest p-value first."""
     least = least_probability(e)
     order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
-    rows = tuple(
-        (
-            literal(str(e.without[i])),
-            str(e.left[i]),
-            f"{e.walk[i]:.3g}",
-            f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001",
-            "●" if e.explains[i] else "",
-        )
-        for i in order
-    )
+    rows = []
+    for i in order:
+        p, explains = f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001", "●" if e.explains[i] else ""
+        rows.append((literal(str(e.without[i])), str(e.left[i]), f"{e.walk[i]:.3g}", p, explains))
     caption = (
         f"{run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
         "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
     )
     header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
-    return Table(caption, header, rows, f"trials-{e.log}-{e.joint}", "lrrrl")
+    return Table(caption, header, tuple(rows), f"trials-{e.log}-{e.joint}", "lrrrl")
 
 
 def least_probability(e: Explanation) -> Column:

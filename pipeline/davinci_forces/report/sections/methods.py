@@ -9,7 +9,7 @@ from davinci_forces import records
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
-from davinci_forces.report.context import Context
+from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
@@ -18,23 +18,23 @@ SYMBOLS = (
     ("$tau$", "effort of a joint: torque where it turns, force where it slides", "N m or N"),
     ('$tau_"ext"$', "external effort: what the robot exerts on its environment, joint by joint", "N m or N"),
     ("$theta, hat(theta)$", "parameters of a joint's model, and their estimates", "as listed"),
-    ("$Phi$", "regressor: effort is $Phi theta$", ""),
-    ("$M, V, F, G$", "inertia, velocity terms, friction and gravity", ""),
-    ("$W$", "weights of weighted least squares", ""),
+    ("$Phi$", "regressor: effort is $Phi theta$", "–"),
+    ("$M, V, F, G$", "inertia, velocity terms, friction and gravity", "–"),
+    ("$W$", "weights of weighted least squares", "–"),
     ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
     ("$theta_m$", "motor angle", "rad"),
     ("$beta_j, Y_j$", "parameters of the links, and their columns of the regressor", "as listed"),
-    ("$z_1, z_2, z_3$", "states of presliding friction, from −1 to 1 (in tables, $z$ is a value over its error)", ""),
-    ("$N, N_p$", "number of samples; number of periods that are averaged", ""),
-    ("$sigma$", "standard deviation of the noise of the signal in the subscript", ""),
+    ("$z_1, z_2, z_3$", "states of presliding friction, from −1 to 1 (in tables, $z$ is a value over its error)", "–"),
+    ("$N, N_p$", "number of samples; number of periods that are averaged", "–"),
+    ("$sigma$", "standard deviation of the noise of the signal in the subscript", "–"),
     ("$T_s$", "sampling time", "s"),
-    ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", ""),
-    ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", ""),
-    ("$w$", "process noise", ""),
-    ("$f, A, H, I$", "the filter's model, its Jacobian, the matrix of measured states, the identity", ""),
-    ("$k, m, n, r$", "number of a sample, of a period, order of a derivative, number of a joint", ""),
+    ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", "–"),
+    ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", "–"),
+    ("$w$", "process noise", "–"),
+    ("$f, A, H, I$", "the filter's model, its Jacobian, the matrix of measured states, the identity", "–"),
+    ("$k, m, n, r$", "number of a sample, of a period, order of a derivative, number of a joint", "–"),
     ("$omega, j, Q$", "angular frequency, imaginary unit, spectrum of the averaged position", "rad/s"),
-    ("$E, g$", "relative error of a candidate; a part of the data that is left out", ""),
+    ("$E, g$", "relative error of a candidate; a part of the data that is left out", "–"),
     ("$e, s_e$", "smoothed external effort in free motion outside the fit; its deviation by the smoother", "N m or N"),
     ("$s, kappa, v$", "stated deviation of the external effort; its factor; variance of the model's error", "N m or N"),
     ("$cal(l), z_0$", "alarm level; upward crossings of zero by $e$", "N m or N, 1/s"),
@@ -168,8 +168,7 @@ def section(context: Context) -> Iterator[Block]:
         yield Prose(block.text.format(**words)) if isinstance(block, Prose) else block
     header = ("Quantity", "Measure", "Good", "Caution", "Problem")
     yield Table("The thresholds of the verdicts of this report.", header, thresholds(), "thresholds", "lllll")
-    symbols = tuple((symbol, meaning, unit or "–") for symbol, meaning, unit in SYMBOLS)
-    yield Table("Symbols.", ("Symbol", "Is", "Unit"), symbols, "symbols", "lll")
+    yield Table("Symbols.", ("Symbol", "Is", "Unit"), SYMBOLS, "symbols", "lll")
     if context.own_fits():
         yield Section("A paragraph for a paper", "paragraph", (Listing(paragraph_for_paper(context)),))
     references = tuple(map(reference, ENTRY.findall(bibliography())))
@@ -205,7 +204,7 @@ def paragraph_for_paper(context: Context) -> str:
     return fill(
         f"External efforts of an arm ({robot.title}) were estimated from motor efforts and joint positions with "
         f"davinci-forces {context.provenance.version} (code {context.provenance.code}). Parameters were identified "
-        f"from {len(logs)} recording{'' if len(logs) == 1 else 's'} ({', '.join(sorted(logs))}) of "
+        f"from {count(len(logs), 'recording')} ({', '.join(sorted(logs))}) of "
         f"{sum(s.duration for s in summaries):.0f} s in all at {rates} Hz{averaged}; the model was "
         f"{'selected by cross-validation over blocks of path' if settings.fit == CHOSEN else settings.fit}. Model, "
         "error (root mean square, beyond noise) on unseen data, and level below which 99 % of free-motion samples "

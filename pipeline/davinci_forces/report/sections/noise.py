@@ -5,20 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
-from davinci_forces.report.content import (
-    Bars,
-    Block,
-    Cell,
-    Figure,
-    Histogram,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Prose,
-    Table,
-    Verdict,
-)
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content.marks import Bars, Histogram, Line, Points
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_cells, run_name, section_of
 from davinci_forces.report.verdicts import MAX_PERIOD_NOISE
@@ -35,21 +23,17 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
         "joints' motion repeats; remarks on the recordings name the samples outside this interval."
     )
-    rows = tuple(
-        (
-            *run_cells(a),
-            context.number(f"period.{a.log}", 6),
-            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau")),
-            context.number(f"noise.{a.log}.{a.joint}.relative_noise", 2, std=None),
-        )
-        for a in averages
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for a in averages:
+        key, period = f"noise.{a.log}.{a.joint}", context.number(f"period.{a.log}", 6)
+        share = context.number(f"{key}.relative_noise", 2, std=None)
+        rows.append((*run_cells(a), period, *context.numbers(key, ("sigma_q", "sigma_dq", "sigma_tau")), share))
     header = ("Log", "Joint", "Period", "Position noise", "Velocity noise", "Effort noise", "Share")
     caption = (
         "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
         "repeat, over the RMS effort. It is part of every relative error, as no model can remove it."
     )
-    yield Table(caption, header, rows, "noise-table", "llrrrrr")
+    yield Table(caption, header, tuple(rows), "noise-table", "llrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)

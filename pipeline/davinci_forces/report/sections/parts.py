@@ -9,21 +9,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.records import Column, PathShare, Prediction, Record, Residual, Track, Whiteness
-from davinci_forces.report.content import (
-    AnyMark,
-    Block,
-    HBand,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Reference,
-    Section,
-    Stems,
-    Table,
-    VSpan,
-    literal,
-)
+from davinci_forces.report.content import Block, OnScreen, Panel, Section, Table, literal
+from davinci_forces.report.content.marks import AnyMark, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.verdicts import Trust, decisive
 
@@ -147,8 +134,5 @@ def strokes(start: Column, end: Column) -> Column:
 
 def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Prediction]:
     """The predictions of free motion in logs that no fit uses; all of them if there is none."""
-    return [
-        p
-        for p in predictions
-        if p.role != "identification" and context.study.log(p.log).has_known_free_motion
-    ] or predictions  # fmt: skip
+    free = [p for p in predictions if p.role != "identification" and context.study.log(p.log).has_known_free_motion]
+    return free or predictions

@@ -3,18 +3,10 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Table
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, fit_name, label, title
-from davinci_forces.report.sections.parts import (
-    contact_spans,
-    effort_panel,
-    first_on_paper,
-    of_free_motion,
-    paper_or_screen,
-    run_cells,
-    run_name,
-    section_of,
-)
+from davinci_forces.report.sections import parts
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
 LEFT_OUT = {
@@ -27,7 +19,7 @@ LEFT_OUT = {
 }
 
 
-@section_of("Prediction", "prediction", Prediction)
+@parts.section_of("Prediction", "prediction", Prediction)
 def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
     yield Prose(
@@ -51,15 +43,15 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "the effort."
     )
     rows = tuple(row(context, p) for p in used)
-    yield from paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
+    yield from parts.paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
     scores = (*estimators(context, predictions), every_score(context, predictions))
     yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
-    unseen = of_free_motion(context, used)
+    unseen = parts.of_free_motion(context, used)
     joints = dict.fromkeys(p.joint for p in unseen)
     worst = [max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error) for joint in joints]
     worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))  # the worst of all on paper
     figures = [figure(context, p) for p in worst]
-    yield from first_on_paper(figures, "The worst predicted run of each other joint", "worst-predicted")
+    yield from parts.first_on_paper(figures, "The worst predicted run of each other joint", "worst-predicted")
 
 
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
@@ -70,14 +62,14 @@ def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
     error, mean, r2, ceiling = context.numbers(p.prefix, ("model_error", "mean_error", "r2", "r2_ceiling"), 2)
-    return *run_cells(p), how, new, error, mean, share, r2, ceiling
+    return *parts.run_cells(p), how, new, error, mean, share, r2, ceiling
 
 
 def every_score(context: Context, predictions: list[Prediction]) -> Table:
     """All scores of all fits."""
     names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "relative_error")
     rows = tuple(
-        (*run_cells(p), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names)) for p in predictions
+        (*parts.run_cells(p), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names)) for p in predictions
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
     caption = "Scores of the raw effort, and the relative error of the low-passed effort."
@@ -104,7 +96,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
     """The model error of one fit in the worst run of a joint that was not fitted."""
     of_joint = [p for p in predictions if p.joint == joint]
-    unseen = [p for p in of_free_motion(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
+    unseen = [p for p in parts.of_free_motion(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
     if not unseen:
         return "–"
     return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)
@@ -112,14 +104,14 @@ def worst(context: Context, predictions: list[Prediction], joint: str, model: st
 
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
-    name, windows = run_name(p.log, p.joint), contact_spans(context, p.log, "contact")
+    name, windows = parts.run_name(p.log, p.joint), parts.contact_spans(context, p.log, "contact")
     error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
     return Figure(
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
         "and their difference.",
         f"{name}: the model error is {size}.",
         (
-            effort_panel(p, *windows),
+            parts.effort_panel(p, *windows),
             Panel("Measured minus model", "time [s]", label(p, "tau", "effort"), (*windows, error)),
         ),
         f"prediction-figure-{p.log}-{p.joint}",

@@ -65,13 +65,9 @@ def channels(summaries: list[LogSummary]) -> Table:
 
 def start_times(summaries: list[LogSummary]) -> Table:
     """Files of every log, and when it was started."""
-    rows = tuple(
-        (
-            literal(summary.log),
-            literal(", ".join(summary.files)),
-            f"{literal(summary.started)} ({summary.zone or 'no zone given'})" if summary.started else "–",
-        )
-        for summary in summaries
-    )
+    rows = []
+    for summary in summaries:
+        started = f"{literal(summary.started)} ({summary.zone or 'no zone given'})" if summary.started else "–"
+        rows.append((literal(summary.log), literal(", ".join(summary.files)), started))
     caption = "Files of the logs, and the date and time of their first samples as they give it."
-    return Table(caption, ("Log", "File", "Started"), rows)
+    return Table(caption, ("Log", "File", "Started"), tuple(rows))

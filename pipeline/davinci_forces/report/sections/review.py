@@ -26,17 +26,13 @@ def section(context: Context) -> Iterator[Block]:
     )
     same = "All ratings are of the numbers that this report shows."
     yield Verdict("warn", changed) if old else Verdict("info", same)
-    rows = tuple(
-        (
-            subject(context, rating),
-            RATINGS[rating.verdict],
-            *(literal(text) or "–" for text in (rating.comment, rating.reviewer, rating.date)),
-            "as rated" if rating.results == now else "changed since",
-        )
-        for rating in context.ratings
-    )
+    rows = []
+    for rating in context.ratings:
+        words = (literal(text) or "–" for text in (rating.comment, rating.reviewer, rating.date))
+        state = "as rated" if rating.results == now else "changed since"
+        rows.append((subject(context, rating), RATINGS[rating.verdict], *words, state))
     header = ("Of", "Rating", "Comment", "Reviewer", "Date", "Numbers")
-    yield from paper_or_screen(Table("Ratings, in the order of review.toml.", header, rows, "ratings", "llllll"))
+    yield from paper_or_screen(Table("Ratings, in the order of review.toml.", header, tuple(rows), "ratings", "llllll"))
 
 
 def subject(context: Context, rating: Rating) -> str:

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Links, Pose, Workspace
-from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Table, literal
-from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.content import Block, Figure3D, Prose, Table, literal
+from davinci_forces.report.content.marks import Colour, Line3D, Points3D
 from davinci_forces.report.content.number import MISSING
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of, strokes
@@ -24,15 +24,12 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
         "The links of the parallelogram share a coordinate, so the tool pivots about a remote centre without a bearing "
         "there. "
     )
+    unbounded = "has no bound: the Jacobian is singular within the joints' limits, or a joint has no limits."
+    reach = unbounded if worst == MISSING else f"reaches {worst} within the joints' limits."
     yield Prose(
         f"The {literal(context.study.robot.title)} is modelled as {chain_kind}. {parallelogram if shared else ''}"
         "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number, which can "
-        "multiply the relative error of an effort, "
-        + (
-            "has no bound: the Jacobian is singular within the joints' limits, or a joint has no limits."
-            if worst == MISSING
-            else f"reaches {worst} within the joints' limits."
-        )
+        f"multiply the relative error of an effort, {reach}"
     )
     rows = []
     for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):

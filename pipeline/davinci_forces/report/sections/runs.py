@@ -4,32 +4,10 @@ from collections.abc import Iterator
 
 from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
 from davinci_forces.records.forces import SMOOTHER
-from davinci_forces.report.content import (
-    AnyMark,
-    Band,
-    Block,
-    Bullets,
-    Cell,
-    Figure,
-    Line,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
 from davinci_forces.report.context import Context, count, label
-from davinci_forces.report.sections.parts import (
-    contact_spans,
-    effort_panel,
-    first_on_paper,
-    paper_or_screen,
-    run_cells,
-    run_name,
-    section_of,
-)
+from davinci_forces.report.sections import parts
 from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
 WORST = "the worst run of this joint in free space"
@@ -37,29 +15,29 @@ ON_PAPER = 2  # joints whose worst run is drawn in the PDF
 LEVELS = ("free_rms", "detection_level")
 
 
-@section_of("Runs", "runs")
+@parts.section_of("Runs", "runs")
 def section(context: Context) -> Iterator[Block]:
     """The recordings, a table of all tracks, the worst run of each joint, and every run on demand."""
-    yield from recording_blocks(context, context.catalogue.records(LogSummary))
-    yield from track_blocks(context, context.catalogue.records(Track))
+    if summaries := context.catalogue.records(LogSummary):
+        yield from recording_blocks(context, summaries)
+    if tracks := context.catalogue.records(Track):
+        yield from track_blocks(context, tracks)
 
 
 def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
-    if not tracks:
-        return
     yield from intro(context, tracks)
-    yield from paper_or_screen(scores(context, tracks))
+    yield from parts.paper_or_screen(scores(context, tracks))
     joints = dict.fromkeys(track.joint for track in tracks)
     spaces = [space for joint in joints if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
-    drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
-    yield from first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
-    others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
+    yield from parts.first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
+    others = [t for t in tracks if t not in worst and not t.at_rest]
     if others:
         folded = tuple(
-            OnScreen(run_name(t.log, t.joint), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others
+            OnScreen(parts.run_name(t.log, t.joint), f"track-{t.log}-{t.joint}", (trace(context, t, ""),))
+            for t in others
         )
         yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
 
@@ -73,7 +51,7 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
         "External efforts are those of its smoother, which uses the whole recording and has no delay."
         + (tested if context.catalogue.records(Explanation) else "")
     )
-    at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
+    at_rest = [parts.run_name(t.log, t.joint) for t in tracks if t.at_rest]
     if at_rest:
         yield Prose(
             f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
@@ -84,7 +62,8 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
 def scores(context: Context, tracks: list[Track]) -> Table:
     """The external effort of every track in free space, and the coverage of its band."""
     rows = tuple(
-        (*run_cells(t), *context.numbers(f"effort.{t.log}.{t.joint}", LEVELS, 2), *coverage(context, t)) for t in tracks
+        (*parts.run_cells(t), *context.numbers(f"effort.{t.log}.{t.joint}", LEVELS, 2), *coverage(context, t))
+        for t in tracks
     )
     header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "By speed", "Band")
     caption = (
@@ -105,7 +84,7 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
-    name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
+    name, windows = parts.run_name(t.log, t.joint), parts.contact_spans(context, t.log, "stated contact")
     largest = float(abs(t.tau_ext_smooth[shown_rows(t)]).max(initial=0.0))
     return Figure(
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
@@ -113,7 +92,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
         f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
-            effort_panel(t, *windows),
+            parts.effort_panel(t, *windows),
             external_effort_panel(t, *windows),
         ),
         f"track-figure-{t.log}-{t.joint}",
@@ -143,9 +122,7 @@ def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
 
 def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
     """One table over all logs, and the remarks of the readers and of the first stages."""
-    if not summaries:
-        return
-    yield from paper_or_screen(overview(context, summaries))
+    yield from parts.paper_or_screen(overview(context, summaries))
     diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("ingest", "resample", "average")]
     remarks_of_stages = [literal(text) for diagnostic in diagnostics for text in diagnostic.text]
     remarked = {summary.log: texts for summary in summaries if (texts := log_remarks(summary))}
@@ -177,18 +154,12 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
-    rows = tuple(
-        (
-            literal(summary.log),
-            summary.role,
-            summary.format,
-            context.count(f"log.{summary.log}.rows"),
-            *context.numbers(f"log.{summary.log}", ("rate", "duration"), 5),
-            context.number(f"log.{summary.log}.jitter", 2),
-            context.number(f"period.{summary.log}", 6, std=None),
-            context.count(f"period.{summary.log}.periods"),
-        )
-        for summary in summaries
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for summary in summaries:
+        log, period = f"log.{summary.log}", f"period.{summary.log}"
+        clock = *context.numbers(log, ("rate", "duration"), 5), context.number(f"{log}.jitter", 2)
+        periods = context.number(period, 6, std=None), context.count(f"{period}.periods")
+        samples = context.count(f"{log}.rows")
+        rows.append((literal(summary.log), summary.role, summary.format, samples, *clock, *periods))
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
-    return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
+    return Table("The logs of the study.", header, tuple(rows), "recorded-table", "lllrrrrrr")

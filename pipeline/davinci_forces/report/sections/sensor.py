@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import SensorForce
-from davinci_forces.report.content import Band, Block, Cell, Figure, Line, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import Band, Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
 from davinci_forces.report.verdicts import band_in_words

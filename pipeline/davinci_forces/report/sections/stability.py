@@ -7,8 +7,8 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stiffness
-from davinci_forces.report.content import Band, Block, Figure, HLine, Line, OnScreen, Panel, Prose, Table, Verdict
-from davinci_forces.report.content.marks import AnyMark, Colour
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line
 from davinci_forces.report.context import Context, label
 from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name, section_of
 

@@ -8,26 +8,19 @@ from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, TipBudget, TipContact, TipForce
 from davinci_forces.report.content import (
-    Band,
-    Bars,
     Block,
     Cell,
     Equation,
     Figure,
     Figure3D,
-    HLine,
-    Line,
-    Line3D,
     OnScreen,
     Panel,
-    Points3D,
     Prose,
     Table,
     Verdict,
-    VSpan,
-    literal,
 )
-from davinci_forces.report.content.marks import AnyMark, Colour
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import section_of, strokes
@@ -93,26 +86,22 @@ def correlations(forces: Sequence[TipForce]) -> str:
 
 def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
-    rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
+    rows: list[tuple[Cell, ...]] = []
+    for contact in contacts:
+        for i in range(len(contact)):
+            prefix = f"tip.{contact.log}.{i + 1}"
+            weak = ", ".join(f"{round(x[i], 1) + 0.0:.1f}" for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+            remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
+            window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s{remark}"
+            numbers = *context.numbers(prefix, (*F, "peak")), context.number(f"{prefix}.sigma_1", 2)
+            rows.append((literal(contact.log), window, *numbers, f"({weak})".replace("-", MINUS)))
     caption = (
         "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
         "along the least certain direction, which is the last column. “Found” marks a window that the study does not "
         "state, “near singular” a pose in which the force is uncertain."
     )
     header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
-    return Table(caption, header, rows, "tip-contacts", "llrrrrrl")
-
-
-def contact_rows(context: Context, contact: TipContact) -> Iterator[tuple[Cell, ...]]:
-    """One row a window."""
-    for i in range(len(contact)):
-        prefix = f"tip.{contact.log}.{i + 1}"
-        numbers = context.numbers(prefix, (*F, "peak"))
-        weak = ", ".join(f"{round(x[i], 1) + 0.0:.1f}" for x in (contact.weak_x, contact.weak_y, contact.weak_z))
-        weak = weak.replace("-", MINUS)
-        window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s"
-        remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
-        yield (literal(contact.log), window + remark, *numbers, context.number(f"{prefix}.sigma_1", 2), f"({weak})")
+    return Table(caption, header, tuple(rows), "tip-contacts", "llrrrrrl")
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:

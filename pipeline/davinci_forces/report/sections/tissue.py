@@ -7,25 +7,9 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Push, Stiffness, TissueModel
-from davinci_forces.report.content import (
-    Band,
-    Block,
-    Cell,
-    Figure,
-    Histogram,
-    HLine,
-    Line,
-    OnScreen,
-    Panel,
-    Points,
-    Prose,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
-from davinci_forces.report.content.marks import AnyMark, Colour
-from davinci_forces.report.context import Context, title
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, Histogram, HLine, Line, Points, VSpan
+from davinci_forces.report.context import Context, count, title
 from davinci_forces.report.sections.parts import MM, THESIS_TISSUE, section_of
 from davinci_forces.report.verdicts import is_minority, stiffness_level
 
@@ -70,12 +54,12 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        text = f"a straight line explains 90 % of the force's variance in none of {pushes(len(tissue))}"
+        text = f"a straight line explains 90 % of the force's variance in none of {count(len(tissue), 'push')}"
         return Verdict("bad", f"{name}: {text}.")
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
     law = next((model.chosen for model in context.catalogue.select(TissueModel, log=tissue.log)), "")
-    text = f"{name}: {stiffness} from {tissue.pushes} of {pushes(len(tissue))}{f'; best model: {law}' if law else ''}"
-    text += "; most pushes do not count" if is_minority(tissue) else ""
+    text = f"{name}: {stiffness} from {tissue.pushes} of {count(len(tissue), 'push')}"
+    text += (f"; best model: {law}" if law else "") + ("; most pushes do not count" if is_minority(tissue) else "")
     true = context.true_stiffness(tissue.log)
     if true is not None:
         missed = abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
@@ -85,16 +69,12 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
 
 def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     """One row a log; in simulations of the thesis's experiments, also the stiffness that the thesis states."""
-    rows: list[tuple[Cell, ...]] = [
-        (
-            literal(tissue.log),
-            "sensor" if tissue.source == "force sensor" else title(tissue.source),
-            *context.numbers(f"tissue.{tissue.log}", ("stiffness", "stiffness_q1", "stiffness_q3"), 4),
-            context.count(f"tissue.{tissue.log}.pushes"),
-            f"{len(tissue)} of {tissue.swings}",
-        )
-        for tissue in tissues
-    ]
+    rows: list[tuple[Cell, ...]] = []
+    for tissue in tissues:
+        key, source = f"tissue.{tissue.log}", "sensor" if tissue.source == "force sensor" else title(tissue.source)
+        numbers = context.numbers(key, ("stiffness", "stiffness_q1", "stiffness_q3"), 4)
+        used, in_contact = context.count(f"{key}.pushes"), f"{len(tissue)} of {tissue.swings}"
+        rows.append((literal(tissue.log), source, *numbers, used, in_contact))
     if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force from", "Stiffness", "Quartile 1", "Quartile 3", "Used", "In contact")
@@ -198,10 +178,10 @@ def surface_map(tissue: Stiffness) -> Figure:
     for i, colour in enumerate(CLASSES):
         x, y = MM * places[across][place == i], MM * places[along][place == i]
         marks.append(Points(x, y, f"{edges[i]:.0f} to {edges[i + 1]:.0f} N/m", colour))
-    name = literal(tissue.log)
+    name, number = literal(tissue.log), count(len(tissue), "push")
     return Figure(
         f"{name}: stiffness over the surface, at the deepest sample of each push in contact.",
-        f"Where {pushes(len(tissue))} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
+        f"Where {number} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
         (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", tuple(marks)),),
         f"tissue-map-{tissue.log}",
         height=70,
@@ -240,8 +220,3 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
             "apart, and the standard error holds only the model's usual error."
         )
         yield Table(caption, header, tuple(rows), "tissue-models", "llrrrrl")
-
-
-def pushes(number: int) -> str:
-    """A number of pushes in words; count() would write '2 pushs'."""
-    return f"{number} push" if number == 1 else f"{number} pushes"

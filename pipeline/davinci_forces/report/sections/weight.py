@@ -4,19 +4,8 @@ import math
 from collections.abc import Iterator
 
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Figure,
-    Line,
-    Number,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-    literal,
-)
+from davinci_forces.report.content import Block, Cell, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, mass_level, percent
@@ -54,42 +43,34 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows = tuple(
-        (
-            literal(weight.log),
-            literal(weight.moves_with),
-            str(Number(weight.stated_mass, "kg")),
-            *context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale")),
-            SIDES.get(weight.side, weight.side),
-        )
-        for weight in weights
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for weight in weights:
+        stated, side = str(Number(weight.stated_mass, "kg")), SIDES.get(weight.side, weight.side)
+        numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
+        rows.append((literal(weight.log), literal(weight.moves_with), stated, *numbers, side))
     caption = (
         "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
         "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
     header = ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side")
-    return Table(caption, header, rows, "weight-table", "llrrrrl")
+    return Table(caption, header, tuple(rows), "weight-table", "llrrrrl")
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
     """The torque constants that known masses give, beside those that are used."""
-    rows = tuple(
-        (
-            *run_cells(of),
-            str(Number(of.stated_mass, "kg")),
-            str(Number(of.torque_constant_used, "N m/A")),
-            context.number(f"weight.{of.log}.{of.joint}.torque_constant", 3),
-        )
-        for of in constants
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for constant in constants:
+        stated, used = Number(constant.stated_mass, "kg"), Number(constant.torque_constant_used, "N m/A")
+        proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
+        rows.append((*run_cells(constant), str(stated), str(used), proposed))
     caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
         "apply one, write it as `torque_constant` in study.toml. They assume the stated mass, its position and the "
         "gear ratio. Joints whose current shows the mass too imprecisely are left out."
     )
-    return Table(caption, ("Log", "Joint", "Known mass", "Used", "Proposed"), rows, "torque-constants", "llrrr")
+    header = ("Log", "Joint", "Known mass", "Used", "Proposed")
+    return Table(caption, header, tuple(rows), "torque-constants", "llrrr")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:

@@ -47,37 +47,29 @@ def render(document: Document) -> bytes:
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
         "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
         "looks": looks(NAMES.values()), "scripts": [
-            _script(name)
+            (TEMPLATES / name).read_text(encoding="utf-8")
             for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
         ],
         "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
-    still = {name: figure for name, figure in figures.items() if name not in zooms}
-    kept = {
-        name: (numbers_json(thin_figure(figure, STILL_POINTS) if isinstance(figure, Figure) else figure), "")
-        for name, figure in still.items()
-    }
-    text = _fill(page, [*kept, *zooms])
-    room = LARGEST - len(text.encode()) - sum(len(content) for content, _ in kept.values())
-    traces = _thin_figures(zooms, room)
-    kept |= {name: (numbers_json(f), thinning_note(zooms[name].samples, f.samples)) for name, f in traces.items()}
-    return _put_in(text, kept).encode()
-
-
-def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
-    """The page with numbers and notes in place of the signs from `_fill`, once the room for them is known."""
+    still = {name: thin_figure(figure, STILL_POINTS) for name, figure in figures.items() if name not in zooms}
+    kept = {f"numbers {name}": numbers_json(figure) for name, figure in still.items()}
+    text = _fill(page, [*figures])
+    room = LARGEST - len(text.encode()) - sum(map(len, kept.values()))
+    for name, trace in _thin_figures(zooms, room).items():
+        kept[f"numbers {name}"] = numbers_json(trace)
+        kept[f"note {name}"] = thinning_note(zooms[name].samples, trace.samples)
     parts = text.split(SIGN)
-    for i in range(1, len(parts), 2):
-        part, _, name = parts[i].partition(" ")
-        parts[i] = kept[name][part == "note"]
-    return "".join(parts)
+    parts[1::2] = [
+        kept.get(part, "") for part in parts[1::2]
+    ]  # in place of the signs of `_fill`; still ones have no note
+    return "".join(parts).encode()
 
 
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
     """The data URL of a figure's picture; that of a trace on screen only has few points."""
-    if on_screen_only and isinstance(figure, Figure) and figure.zoomable:
-        figure = thin_figure(figure, FOLDED_POINTS)
-    return address(shrink(svg(figure)))
+    is_replaced = on_screen_only and isinstance(figure, Figure) and figure.zoomable
+    return address(shrink(svg(thin_figure(figure, FOLDED_POINTS) if is_replaced else figure)))
 
 
 def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
@@ -90,10 +82,6 @@ def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
 def _json(value: Any) -> str:
     """Data for a script in the page, without any text that could close the script's element."""
     return json.dumps(value, ensure_ascii=False).replace("<", "\\u003c").replace(SIGN, "")
-
-
-def _script(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _fill(page: Json, names: list[str]) -> str:

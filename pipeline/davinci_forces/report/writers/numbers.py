@@ -4,7 +4,7 @@ import base64
 import json
 import math
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from davinci_forces.report.figures.palette import assign_looks
 from davinci_forces.report.figures.space import LABELS
 
 Json = dict[str, Any]
+AnyFigure = TypeVar("AnyFigure", Figure, Figure | Figure3D)
 PIXELS = 96 / 25.4  # of CSS in a millimetre
 CODES = 2**16 - 2  # steps of a range that two bytes tell apart; one more code is for missing values
 FEW_VALUES = 64  # a column of fewer is written in full
@@ -91,8 +92,10 @@ def _typical_step(column: Array) -> float:
     return float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
 
 
-def thin_figure(figure: Figure, limit: int) -> Figure:
+def thin_figure(figure: AnyFigure, limit: int) -> AnyFigure:
     """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all."""
+    if isinstance(figure, Figure3D):
+        return figure
     sizes = [points_of(mark) for panel in figure.panels for mark in panel.marks]
     shares = iter(_share_points(sizes, limit))
     thinned = ((panel, tuple(thin_mark(mark, next(shares)) for mark in panel.marks)) for panel in figure.panels)

@@ -32,7 +32,6 @@ from davinci_forces.report.campaign.studies import (
     Series,
     Slope,
     every_series,
-    series_key,
 )
 from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
@@ -116,17 +115,15 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
             continue
         line = trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
         if line is not None:
-            slopes[series_key(row)] = Slope(line.slope, line.std)
-            tests["drift", series_key(row), 0] = line.p
-        tests["scatter", series_key(row), 0] = scatter(row.value, row.std)
-        tests |= {
-            ("outlier", series_key(row), i): p for i, p in enumerate(outlier_probabilities(row.value, row.std).tolist())
-        }
+            slopes[row.key] = Slope(line.slope, line.std)
+            tests["drift", row.key, 0] = line.p
+        tests["scatter", row.key, 0] = scatter(row.value, row.std)
+        tests |= {("outlier", row.key, i): p for i, p in enumerate(outlier_probabilities(row.value, row.std).tolist())}
     rejections = holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
     significant = [test for test, rejected in zip(tests, rejections, strict=True) if rejected]
     drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
     odd = {where: tuple(i for k, at, i in significant if k == "outlier" and at == where) for _, where, _ in significant}
-    limits = {series_key(row): limit for row in series if (limit := limits_of(row, odd.get(series_key(row), ())))}
+    limits = {row.key: limit for row in series if (limit := limits_of(row, odd.get(row.key, ())))}
     return Findings(
         tuple(series), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd, limits,
         IN_CONTROL, len(tests), FALSE_ALARM_PROBABILITY,

@@ -9,7 +9,7 @@ from davinci_forces.maths.contact.detection import alarm_level, free_motion_stat
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
-from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, diagnostic
+from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -62,14 +62,12 @@ def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,
-        log=track.log,
-        joint=track.joint,
+        statistics,
+        track,
         filter=name,
-        role=track.role,
         tested=int(np.sum(free)),
         band_width=NORMAL_95 * float(std[free].mean()),
         free_max=statistics.largest,
-        crossings=statistics.crossings,
         quartile_coverage=coverage,
         quartile_coverage_std=coverage_std,
     )
@@ -77,11 +75,8 @@ def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans
 
 def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     """Take the highest level of all logs, one Threshold per joint with any free space, by the smoother."""
-    by_joint: dict[str, list[FreeSpace]] = {}
-    for space in spaces:
-        if space.filter == SMOOTHER:
-            by_joint.setdefault(space.joint, []).append(space)
-    for joint, joint_spaces in by_joint.items():
+    smoothed = (space for space in spaces if space.filter == SMOOTHER)
+    for joint, joint_spaces in by_name(smoothed, "joint").items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
         alarms = [alarm_level(space.free_rms, space.free_max, space.crossings) for space in unfitted]

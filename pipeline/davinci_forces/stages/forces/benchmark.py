@@ -69,8 +69,8 @@ def compare(
             "benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; state a shorter delay in [settings]"
         )
     yield Comparison.like(
-        space, log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
-        push_peak=push, push_share=shown.share, push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
+        space, model, filter=label, default=int(label == DEFAULT), push_peak=push, push_share=shown.share,
+        push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from davinci_forces.maths.arrays import Array, evenly
 from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, MIN_LOGS_BAND, count_uncorrelated
-from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel
+from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel, by_name
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Joint
 from davinci_forces.study import LogEntry
@@ -50,12 +50,8 @@ def run(
 
 def gather(motions: Iterable[FreeMotion]) -> Iterator[ErrorBand]:
     """Collect the out-of-sample model error of all logs, one error band per joint."""
-    by_joint: dict[str, list[FreeMotion]] = {}
-    for motion in motions:
-        by_joint.setdefault(motion.joint, []).append(motion)
-    for joint, joint_motions in by_joint.items():
-        spread = [joint_motions[i] for i in evenly(len(joint_motions), MAX_LOGS_BAND)]
-        yield band(joint, spread)
+    for joint, joint_motions in by_name(motions, "joint").items():
+        yield band(joint, [joint_motions[i] for i in evenly(len(joint_motions), MAX_LOGS_BAND)])
 
 
 def band(joint: str, motions: list[FreeMotion]) -> ErrorBand:

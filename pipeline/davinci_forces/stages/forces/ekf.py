@@ -74,21 +74,15 @@ def track_effort(
         friction = part.standing * part.static_friction**2 / 3.0
         model_variance = np.maximum(variance[rows] - own[rows] ** 2, 0.0)
         yield Track.like(
-            model,
+            estimate,
+            noise,
+            part,
             filter=DEFAULT,
-            r_q=noise.r_q,
-            r_dq=noise.r_dq,
-            q_dq=noise.q_dq,
             q_tau=noise.q_tau * model.rate**0.5,
             day_offset=offset.value,
             day_offset_std=offset.std,
             band_from=source,
             **numbers,
-            t=part.t,
-            q=estimate.q,
-            dq=estimate.dq,
-            tau=part.tau,
-            tau_hat=part.tau_hat,
             tau_ext=estimate.tau_ext - offset.value,
             tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late[rows] ** 2 + model_variance + offset.std**2 + friction),
             tau_ext_std_filter=estimate.tau_ext_std,
@@ -96,11 +90,6 @@ def track_effort(
             tau_ext_smooth_std=np.sqrt(variance[rows] + offset.std**2 + friction + rounding[rows] ** 2),
             tau_ext_rounding=rounding[rows],
             tau_ext_direct=part.tau - part.tau_hat - offset.value,
-            innovation_q=estimate.innovation_q,
-            innovation_dq=estimate.innovation_dq,
-            nis=estimate.nis,
-            standing=part.standing,
-            unscored=part.unscored,
         )
 
 

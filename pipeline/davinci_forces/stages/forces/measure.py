@@ -5,14 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import (
-    TIP_REACH,
-    Event,
-    events,
-    summarise,
-    typical_alarm_level,
-    without_rounding,
-)
+from davinci_forces.maths.contact import detection
+from davinci_forces.maths.contact.detection import Event
 from davinci_forces.maths.signals.standstill import SLOW
 from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
@@ -41,11 +35,11 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
-    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - TIP_REACH * track.smooth_rise)
+    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - detection.TIP_REACH * track.smooth_rise)
     level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
-        for event in events(track.t, *steady_effort(track), level, track.smooth_rise)
+        for event in detection.events(track.t, *steady_effort(track), level, track.smooth_rise)
         if steady[np.searchsorted(track.t, event.onset).clip(0, len(steady) - 1)]
     ]
     pairs = match_windows(sorted(entry.contact), detected)
@@ -92,7 +86,7 @@ def level_while_identified(track: Track, entry: LogEntry) -> float:
     if entry.role != "identification" or not free.any():
         return 0.0
     largest = float(np.abs(track.tau_ext_smooth[free]).max())
-    return min(largest, 2.0 * typical_alarm_level(track.tau_ext_smooth, free, track.rate))
+    return min(largest, 2.0 * detection.typical_alarm_level(track.tau_ext_smooth, free, track.rate))
 
 
 def contacts(
@@ -116,9 +110,9 @@ def contacts(
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     effort = (*steady_effort(track), track.tau_ext_direct)
-    rows, above, short = [], [], []
+    rows, short = [], []
     for window, event, stated in placed:
-        summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
+        summary = detection.summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
         if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.noise_std:
             event = None
         if summary is not None and (event or (stated and not track.at_rest)):
@@ -127,8 +121,8 @@ def contacts(
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))  # flattened, if short
-            rows.append((int(stated), int(event is not None), *times, *duration, peak, *summary[1:4], *impulse))
-            above.append(is_above[~is_outside(track.t, [window])].any())
+            above = bool(is_above[~is_outside(track.t, [window])].any())
+            rows.append((stated, event is not None, above, *times, *duration, peak, *summary[1:4], *impulse))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
@@ -136,16 +130,15 @@ def contacts(
     if not rows:
         return
     names = (
-        "stated", "found", "onset", "onset_std", "release", "release_std", "duration", "duration_std", "peak",
+        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std", "peak",
         "peak_std", "mean", "mean_std", "impulse", "impulse_std",
     )  # fmt: skip
-    columns = dict(zip(names, np.array(rows).T, strict=True))
-    yield Contact.like(threshold, log=track.log, above=np.array(above, np.int64), **columns)
+    yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
 
 
 def steady_effort(track: Track) -> tuple[Array, Array]:
     """The smoothed effort (N,) and its deviation (N,) without what is rounded off, which is added to that of a peak."""
-    return track.tau_ext_smooth, without_rounding(track.tau_ext_smooth_std, track.tau_ext_rounding)
+    return track.tau_ext_smooth, detection.without_rounding(track.tau_ext_smooth_std, track.tau_ext_rounding)
 
 
 def hidden_peak(track: Track, onset: float) -> str:

@@ -16,7 +16,7 @@ from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
-from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track
+from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track, by_name
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -99,11 +99,10 @@ def compare(
     ratios = peak[long] / smooth[long]
     ratio = float(np.median(ratios)) if len(ratios) else float("nan")
     ratio_std = MEDIAN_STD * float(np.std(ratios, ddof=1)) / len(ratios) ** 0.5 if len(ratios) > 1 else float("nan")
-    yield Streamed(
-        log=track.log, joint=track.joint, role=track.role, rate=track.rate, stream_delay=late, free_rms=rms,
-        free_rms_std=rms_std, stream_loss=loss, stream_loss_std=loss_std, free_max=statistics.largest,
-        crossings=statistics.crossings, peak_ratio=ratio,
-        peak_ratio_std=ratio_std, onset=onset, duration=duration, smooth_peak=smooth, peak=peak,
+    yield Streamed.like(
+        statistics, track, stream_delay=late, free_rms=rms, free_rms_std=rms_std, stream_loss=loss,
+        stream_loss_std=loss_std, free_max=statistics.largest, peak_ratio=ratio, peak_ratio_std=ratio_std, onset=onset,
+        duration=duration, smooth_peak=smooth, peak=peak,
     )  # fmt: skip
 
 
@@ -116,10 +115,7 @@ def streamed_peak(t: Array, tau_ext: Array, contact: Contact, row: int, late: fl
 
 def gather(streams: Iterable[Streamed]) -> Iterator[StreamLevel]:
     """Compute the alarm level of each joint's stream, and count the contacts whose peak exceeds it."""
-    by_joint: dict[str, list[Streamed]] = {}
-    for stream in streams:
-        by_joint.setdefault(stream.joint, []).append(stream)
-    for joint, logs in by_joint.items():
+    for joint, logs in by_name(streams, "joint").items():
         levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in logs]
         level, source = max(zip(levels, logs, strict=True), key=lambda pair: pair[0])
         yield StreamLevel(

@@ -9,7 +9,7 @@ from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import smallest_q_tau, steady_std
 from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
-from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
+from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning, by_name
 
 POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous")  # fields that are pooled by the median
 TRIAL_DELAYS = (0.02, 0.05, 0.1, 0.2, 0.4)  # [s]
@@ -18,21 +18,18 @@ MIN_NOISE = 1e-9  # over the range of a signal: without noise, the innovations' 
 
 def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float, delay: float) -> Iterator[Tuning]:
     """Tune the filter to a moving joint in an identification log, where nothing touches the robot.  Section 7.3"""
-    if model.role == "identification" and not model.at_rest and noise is not None:
-        yield tuning(model, initial_noise(model, noise, lowpass), delay)
-
-
-def tuning(model: JointModel, before: NoiseModel, delay: float) -> Tuning:
-    """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
+    if model.role != "identification" or model.at_rest or noise is None:
+        return
     parts = [part.part(slice(0, part.samples)) for part in filter_inputs(model)]
     T_s, inertia = 1.0 / model.rate, float(model.inertia.max())
-    noise = tune_noise(parts, before, inertia, model.viscous, delay)
+    before = initial_noise(model, noise, lowpass)
+    tuned = tune_noise(parts, before, inertia, model.viscous, delay)
     initial, final = (
-        sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
+        sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=tuned.q_tau), tuned)
     )
-    return Tuning.like(
-        model, r_q=noise.r_q, r_dq=noise.r_dq, r_tau=noise.q_dq * inertia / T_s, q_tau=noise.q_tau / T_s**0.5,
-        inertia=inertia, likelihood_gain=final - initial, tested=len(model),
+    yield Tuning.like(
+        tuned, model, r_tau=tuned.q_dq * inertia / T_s, q_tau=tuned.q_tau / T_s**0.5, inertia=inertia,
+        likelihood_gain=final - initial, tested=len(model),
     )  # fmt: skip
 
 
@@ -58,10 +55,7 @@ def gather(tunings: Iterable[Tuning], *, delay: float) -> Iterator[FilterNoise]:
 
     The inertia is the largest one, because the filter is slowest with it.
     """
-    by_joint: dict[str, list[Tuning]] = {}
-    for tuning in tunings:
-        by_joint.setdefault(tuning.joint, []).append(tuning)
-    for joint, ts in by_joint.items():
+    for joint, ts in by_name(tunings, "joint").items():
         medians = {name: float(np.median([getattr(t, name) for t in ts])) for name in POOLED}
         inertia, trials = max(t.inertia for t in ts), np.array(TRIAL_DELAYS)
         std = np.array([std_with_delay(inertia, medians, trial) for trial in TRIAL_DELAYS])

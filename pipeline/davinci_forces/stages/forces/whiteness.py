@@ -17,19 +17,12 @@ from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.whiteness import TWO_SIDED_95, TWO_SIDED_99, cross_correlation, mean_square_band
 from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run, spans
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
-from davinci_forces.records import (
-    Column,
-    Explanation,
-    FilterNoise,
-    Fit,
-    Innovation,
-    JointModel,
-    Motion,
-    PeriodResidual,
-    Residual,
-    Track,
-    Whiteness,
-)
+from davinci_forces.records.forces import FilterNoise, Track
+from davinci_forces.records.model import Fit, Residual
+from davinci_forces.records.prediction import JointModel
+from davinci_forces.records.record import Column
+from davinci_forces.records.recordings import Motion, PeriodResidual
+from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -57,7 +50,7 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     results = {name: statistics(x) for name, x in signals.items()}
     all_white = int(all(r["white"] and float(r["periodogram_p"]) > MIN_PROBABILITY for r in results.values()))  # type: ignore[arg-type]
     for name, result in results.items():
-        yield Whiteness(log=subject.log, joint=subject.joint, signal=name, all_white=all_white, **result)  # type: ignore[arg-type]
+        yield Whiteness.like(subject, signal=name, all_white=all_white, **result)
 
 
 def statistics(x: Column) -> dict[str, object]:
@@ -200,9 +193,8 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     """The result of a search for the causes of innovations that are not white, trial by trial."""
     trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.possible_contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
-    return Explanation(
-        log=model.log,
-        joint=model.joint,
+    return Explanation.like(
+        model,
         finding=classify(causes),
         verdict=verdict(causes) + caveat,
         clock_std=clock_std,

@@ -1,6 +1,5 @@
 """Search for the model of each joint by cross-validation, fit it to all logs, and map its friction over velocity."""
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated
 
@@ -26,18 +25,10 @@ from davinci_forces.identification.used import Identified
 from davinci_forces.maths.selection import standard_error
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
-from davinci_forces.records import (
-    Average,
-    Choice,
-    Diagnostic,
-    Fit,
-    FrictionMap,
-    ModelSearch,
-    Motion,
-    Prediction,
-    diagnostic,
-)
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.model import Choice, Fit, FrictionMap, ModelSearch
+from davinci_forces.records.prediction import CHOSEN, Prediction
+from davinci_forces.records.record import Diagnostic, by_name, diagnostic
+from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 
 MAPPED_ROLES = ("identification", "friction")
@@ -74,19 +65,19 @@ def run(
     searched = select_candidate(searched_candidates(robot, searches, separate, arm, len(logs)), len(logs))
     selection = better(fixed, searched)
     yield from choice(selection, logs)
-    yield from (search_record(search, is_used(search, selection.chosen)) for search in searches)
+    yield from (search_record(search, selection.chosen) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
         where = "the report may name the cause beside all fits of each joint"
         yield diagnostic("choose", "arm", "warning", f"{message}; {where}")
     shown = (*best_of_structures(fixed), *best_of_setting(fixed, fit))
-    by_name = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
-    by_variant = {c.variant: name for name, c in by_name.items()}
-    for name, candidate in by_name.items():
+    named = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
+    by_variant = {c.variant: name for name, c in named.items()}
+    for name, candidate in named.items():
         if name != "independent.lse":
             yield from fits(candidate, fixed.candidates, len(logs), robot, by_variant[candidate.variant] == name)
     yield from fits(selection.chosen, fixed.candidates, len(logs), robot, with_consistent=True)
-    for candidate in by_name.values():
+    for candidate in named.values():
         yield from predictions(candidate, False, logs)
     yield from predictions(selection.chosen, True, logs)
 
@@ -104,11 +95,8 @@ def fits(
 def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
     """The joints of each log, in the robot's order; with several clocks, only joints on the first joint's clock."""
     joints, periods = [joint.name for joint in robot.joints], list(averages)
-    records: dict[str, list[Motion]] = defaultdict(list)
-    for record in motions:
-        records[record.log].append(record)
     logs: list[Observed] = []
-    for log_records in records.values():
+    for log_records in by_name(motions, "log").values():
         ordered = sorted(log_records, key=lambda record: joints.index(record.joint))
         logs.append(observe([r for r in ordered if len(r) == len(ordered[0])], periods, lowpass, len(logs)))
     return logs
@@ -120,13 +108,9 @@ def modelled_logs(
     """The logs of each moving joint by itself, and, if joints move together, the logs that contain all joints."""
     whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.is_moving.any())
     arm = whole if robot.chain is not None and any(log.is_moving.sum() > 1 for log in whole) else ()
-    separate: dict[str, list[Observed]] = defaultdict(list)
-    for log in arm or logs:
-        for i, record in enumerate(log.records):
-            if not record.at_rest:
-                separate[record.joint].append(log.single_joint(i))
-    order = [joint.name for joint in robot.joints if joint.name in separate]
-    return {name: tuple(separate[name]) for name in order}, arm
+    moving = [(r.joint, log.single_joint(i)) for log in arm or logs for i, r in enumerate(log.records) if not r.at_rest]
+    separate = {joint.name: tuple(log for name, log in moving if name == joint.name) for joint in robot.joints}
+    return {name: joint_logs for name, joint_logs in separate.items() if joint_logs}, arm
 
 
 def not_of_arm(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnostic]:
@@ -169,20 +153,14 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
         )
 
 
-def is_used(search: SearchResult, chosen: Candidate) -> bool:
-    """Whether the chosen candidate has the terms of a search."""
-    parts = [part for part in chosen.parts if search.joint in part.model.efforts]
-    return chosen.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
-
-
-def search_record(search: SearchResult, used: bool) -> ModelSearch:
-    """The steps of the search for the model of a joint."""
+def search_record(search: SearchResult, candidate: Candidate) -> ModelSearch:
+    """The steps of the search for the model of a joint, and whether the chosen candidate has its terms."""
     steps, chosen = search.steps, search.chosen
-    return ModelSearch(
-        joint=search.joint,
-        structure=search.structure,
-        cutoff=chosen.processing.cutoff,
-        effort_lag=chosen.processing.effort_lag,
+    parts = [part for part in candidate.parts if search.joint in part.model.efforts]
+    used = candidate.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
+    return ModelSearch.like(
+        search,
+        chosen.processing,
         ridge=chosen.strength,
         term=tuple(term.name for term in chosen.terms),
         term_scale=tuple(term.scale for term in chosen.terms),
@@ -243,7 +221,8 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
     model, log = part.model, part.library.logs[0]
     processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
     defined = model.parameters
-    return Fit(
+    return Fit.like(
+        estimate,
         group=model.group,
         model=candidate.variant,
         estimator=estimator,
@@ -258,7 +237,6 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
         unit=np.array([parameter.unit for parameter in defined], object),
         scale=np.array([parameter.scale for parameter in defined]),
         positive=np.array([parameter.positive for parameter in defined], float),
-        **estimate._asdict(),
     )
 
 
@@ -285,11 +263,9 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     valid &= is_evaluated(motion)
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
     return FrictionMap.like(
+        means,
+        fit,
         motion,
-        model=fit.model,
-        estimator=fit.estimator,
-        dq=means.dq,
-        gaining=means.gaining.astype(int),
         tau_friction=means.mean[:, 0],
         tau_friction_std=means.std[:, 0],
         tau_friction_hat=means.mean[:, 1],

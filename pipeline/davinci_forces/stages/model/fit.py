@@ -30,24 +30,21 @@ from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
-from davinci_forces.records import (
-    Column,
+from davinci_forces.records.model import (
     CrossFit,
-    Diagnostic,
     Fit,
     FittedPaths,
     Guess,
     Identifiability,
     MeasurementNoise,
-    Motion,
-    Prediction,
     Residual,
     SwarmSearch,
-    Trajectory,
-    diagnostic,
 )
+from davinci_forces.records.prediction import Prediction
+from davinci_forces.records.record import Column, Diagnostic, diagnostic
+from davinci_forces.records.recordings import Motion, Trajectory
 from davinci_forces.robots.models import Reach, independent, round_scale
-from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MAX_PATHS = 20  # number of fitted paths with which a recording is compared
@@ -93,7 +90,7 @@ def run(
         parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
-            yield from fit_joint(model, parts, robot, joint, others, lowpass)
+            yield from fit_joint(model, parts, robot, others, lowpass)
 
 
 def apply(
@@ -116,7 +113,7 @@ def apply(
 
 
 def fit_joint(
-    model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str], lowpass: float
+    model: IndependentJoint, parts: Sequence[Part], robot: Robot, others: Sequence[str], lowpass: float
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
@@ -134,8 +131,8 @@ def fit_joint(
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
-    yield from identifiability(model, regression, estimates, robot, joint, others)
-    yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
+    yield from identifiability(model, regression, estimates, robot, others)
+    yield from cost_of_consistency(model.group, regression, estimates, robot.joint(model.group).unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -161,18 +158,13 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
 
 
 def identifiability(
-    model: IndependentJoint,
-    regression: Regression,
-    estimates: dict[str, Estimate],
-    robot: Robot,
-    joint: Joint,
-    others: Sequence[str],
+    model: IndependentJoint, regression: Regression, estimates: dict[str, Estimate], robot: Robot, others: Sequence[str]
 ) -> Iterator[Identifiability | Diagnostic]:
     """Assess how well the logs determine the parameters, and explain an inertia that is not positive."""
     plain = estimates.get("lse")
     if plain is None:
         return
-    excitation = analyse_columns(regression.triangle)
+    joint, excitation = robot.joint(model.group), analyse_columns(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
     pairs, insignificant = describe_correlated(names, excitation), describe_insignificant(regression, plain)
     yield Identifiability(
@@ -256,7 +248,8 @@ def fit_record(
     """The Fit of an estimate, with its mean square error and R2 on its own data."""
     squares, r2 = fit_residual(regression, estimate) ** 2, r_squared(regression, estimate)
     mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
-    return Fit(
+    return Fit.like(
+        estimate,
         group=model.group,
         model=model.name,
         estimator=name,
@@ -271,17 +264,13 @@ def fit_record(
         r2=r2,
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
-        correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         scale=np.array([parameter.scale for parameter in model.parameters]),
         positive=np.array([parameter.positive for parameter in model.parameters], float),
-        theta=estimate.theta,
-        theta_std=estimate.theta_std,
         theta_std_noise=estimate.standard_errors.noise,
         theta_std_model=estimate.standard_errors.model,
-        theta_std_classical=estimate.theta_std_classical,
     )
 
 

@@ -15,20 +15,10 @@ from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, UNSCORED_STRETCH, is_outside, spans
-from davinci_forces.records import (
-    Average,
-    Choice,
-    Counts,
-    Diagnostic,
-    Fit,
-    FittedPaths,
-    JointModel,
-    Motion,
-    Prediction,
-    Residual,
-    diagnostic,
-)
-from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
+from davinci_forces.records.model import Choice, Fit, FittedPaths, Residual
+from davinci_forces.records.prediction import CHOSEN, SAME_PATH, JointModel, PathShare, Prediction
+from davinci_forces.records.record import Counts, Diagnostic, diagnostic
+from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -66,10 +56,10 @@ def predict_joint(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of a joint by its own fits, by the chosen one, and by the one that the setting `fit` names."""
     name = f"{motion.log}/{motion.joint}"
-    identified = along.identified
+    identified, on_clock = along.identified, along.joints_on_clock(motion.joint)
     independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
     chosen = identified.fit_of(motion.joint, CHOSEN)
-    if chosen is not None and not set(identified.model(chosen).joints) <= along.joints_on_clock(motion.joint):
+    if chosen is not None and not set(identified.model(chosen).joints) <= on_clock:
         missing = f"{name}: the log does not hold the other joints that the chosen model needs"
         message = f"{missing}, so {FALLBACK} replaces it; add their channels"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", message)
@@ -78,11 +68,7 @@ def predict_joint(
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
     named = identified.fit_of(motion.joint, setting) if setting != CHOSEN else None
-    if (
-        named
-        and named not in independent
-        and set(identified.model(named).joints) <= along.joints_on_clock(motion.joint)
-    ):
+    if named and named not in independent and set(identified.model(named).joints) <= on_clock:
         labelled.append((named.model, named.estimator, named))
     scored = is_scored(motion, along, chosen, entry)
     free = scored & is_outside(motion.t, entry.possible_contact)

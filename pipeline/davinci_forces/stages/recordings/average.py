@@ -224,10 +224,8 @@ def average_joint(
     for symbol, x in folded.items():
         columns |= {symbol: x.mean, f"{symbol}_var": x.var, f"sigma_{symbol}": averaging.noise_std(x)}
         columns[f"sigma_{symbol}_std"] = error_of_pooled_mean(x.var, function=np.sqrt)
-    yield Average(
-        log=signal.log,
-        joint=signal.joint,
-        rate=signal.rate,
+    yield Average.like(
+        signal,
         period=period.length,
         period_std=period.std,
         stated_period=stated,

@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
+from davinci_forces.maths.signals import smoothing
 from davinci_forces.maths.signals.clock import are_gaps, are_missing, longest_bridge
 from davinci_forces.maths.signals.faults import count_saturated, find_stuck
-from davinci_forces.maths.signals.smoothing import (
-    lowpass_segments,
-    measured_motion,
-    noise_std,
-    segments,
-    share_passed,
-    white_std,
-)
 from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
 from davinci_forces.maths.signals.windows import runs
 from davinci_forces.records import Column, Counts, Diagnostic, Motion, Recording, Signal, diagnostic
@@ -70,7 +63,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         columns = [on_uniform_clock(recording, part, T_s) for part in parts]
     segment = np.repeat(np.arange(len(parts)), [len(t) for t, *_ in columns])
     t, q, dq, tau, filled = (np.concatenate(c) if len(parts) > 1 else c[0] for c in zip(*columns, strict=True))
-    smooth = measured_motion(q, None if recording.velocity == "derived" else dq, segment, 1.0 / T_s, lowpass)
+    smooth = smoothing.measured_motion(q, None if recording.velocity == "derived" else dq, segment, 1.0 / T_s, lowpass)
     if recording.velocity == "derived":
         dq = smooth[1]
     at_rest = not moves(q, joint)
@@ -102,17 +95,19 @@ def moves(q: Column, joint: Joint) -> bool:
 def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
     """The Motion of a joint, also of one at rest, which other joints may drive; the low-pass removes its noise."""
     q, dq, ddq = smooth
-    passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
-    sigma_q = white_std(signal.q - q, passed)
+    passed, rate, segment = smoothing.share_passed(signal.rate, lowpass), signal.rate, signal.segment
+    sigma_q = smoothing.white_std(signal.q - q, passed)
     logged = signal.velocity == "logged"
-    sigma_dq = white_std(signal.dq - dq, passed) if logged else noise_std(dq, segment, rate, lowpass)
+    sigma_dq = (
+        smoothing.white_std(signal.dq - dq, passed) if logged else smoothing.noise_std(dq, segment, rate, lowpass)
+    )
     q_std, dq_std = sigma_q * float(np.sqrt(passed)), sigma_dq * float(np.sqrt(passed) if logged else 1.0)
     if signal.at_rest:
         dq, still = np.zeros_like(dq), np.ones(len(dq), np.bool_)
     else:
         still = is_standing_still(q, dq, segment, rate, q_std, round(rate / lowpass))
         dq = without_doubtful_signs(dq, still, q_std, dq_std)
-    sigma_tau = noise_std(signal.tau, segment, rate, lowpass)
+    sigma_tau = smoothing.noise_std(signal.tau, segment, rate, lowpass)
     return Motion.like(
         signal, cutoff=lowpass, effort_lag=0.0, sigma_q=sigma_q, sigma_dq=sigma_dq, sigma_tau=sigma_tau, q=q, dq=dq,
         ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, standing=still.astype(np.int64),
@@ -129,19 +124,16 @@ def velocity_faults(
     if recording.velocity == "derived" or not (moves(q, joint) or moves(np.cumsum(dq - dq.mean()) / rate, joint)):
         return
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
-    slow = lowpass_segments(q, segment, rate, cutoff)
-    derived = np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
-    ratio = median_ratio(lowpass_segments(dq, segment, rate, cutoff), derived)
+    slow = smoothing.lowpass_segments(q, segment, rate, cutoff)
+    derived = np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in smoothing.segments(segment)])
+    ratio = median_ratio(smoothing.lowpass_segments(dq, segment, rate, cutoff), derived)
     if abs(ratio - 1) < MAX_VELOCITY_ERROR:
         return
     hints = (hint for factor, hint in UNIT_HINTS if abs(ratio / factor - 1) < MAX_VELOCITY_ERROR)
     fitting = (hint for hint in hints if joint.kind is Kind.PRISMATIC or "mm" not in hint)
     hint = next(fitting, "check the sign, unit and column of both, and the rate of the clock")
-    what = (
-        f"is {ratio:.3g} times the derivative of the logged position"
-        if ratio < np.inf
-        else "is not 0 though the position stands still"
-    )
+    times = f"is {ratio:.3g} times the derivative of the logged position"
+    what = times if ratio < np.inf else "is not 0 though the position stands still"
     fault = f"{recording.log}/{recording.joint}: the logged velocity {what}; {hint}"
     if not 1 / MAX_VELOCITY_RATIO < ratio < MAX_VELOCITY_RATIO:
         raise BadLog(f"{fault}; without the channel of the velocity, it is derived from the position")
@@ -163,11 +155,9 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
     Raises BadLog if they lie so far beyond that no motion of this joint is like that.
     """
     beyond, largest = [], 0.0
-    names = ("positions", "{position}"), ("velocities", "{position}/s")
-    for (what, unit), x, limits, usual in zip(
-        names, smooth, (joint.limits.q, joint.limits.dq), USUAL_LIMITS, strict=False
-    ):
-        reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, limits))
+    names, limits = (("positions", "{position}"), ("velocities", "{position}/s")), (joint.limits.q, joint.limits.dq)
+    for (what, unit), x, bounds, usual in zip(names, smooth, limits, USUAL_LIMITS, strict=False):
+        reach, limit = float(np.percentile(np.abs(x), 99.0)), max(map(abs, bounds))
         assumed, limit = (", which is assumed as none is stated", usual) if np.isinf(limit) else ("", limit)
         if reach > MAX_BEYOND_LIMITS * limit:
             times = f"{reach / limit:.3g} times the limit of {limit:.3g}"

@@ -12,17 +12,9 @@ from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobi
 from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, is_singular, matrix, shared_correlations
 from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
-from davinci_forces.records import (
-    ArmCorrelation,
-    Contact,
-    Diagnostic,
-    JointCorrelation,
-    TipBudget,
-    TipContact,
-    TipForce,
-    Track,
-    diagnostic,
-)
+from davinci_forces.records.forces import Contact, Track
+from davinci_forces.records.record import Diagnostic, diagnostic
+from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, TipBudget, TipContact, TipForce
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 

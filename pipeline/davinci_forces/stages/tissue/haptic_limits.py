@@ -15,17 +15,9 @@ from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.records import (
-    Comparison,
-    FilterNoise,
-    Fit,
-    HandLimit,
-    HapticMotion,
-    HapticResponse,
-    HapticRun,
-    StabilityLimit,
-    Stiffness,
-)
+from davinci_forces.records.forces import Comparison, FilterNoise
+from davinci_forces.records.model import Fit
+from davinci_forces.records.tissue import HandLimit, HapticMotion, HapticResponse, HapticRun, StabilityLimit, Stiffness
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import HapticScenario
 

@@ -154,6 +154,8 @@ def record_of(push: palpation.PalpatedPush, log: str, best: tissue.FittedLaw | N
         fitted = fitted + float(np.mean((push.force - fitted)[inside]))
     return Push.like(
         push,
+        push.contact,
+        line,
         log=log,
         push=push.number,
         contact=push.contact.state,
@@ -161,16 +163,11 @@ def record_of(push: palpation.PalpatedPush, log: str, best: tissue.FittedLaw | N
         k_t_std=float(np.hypot(line.k_std, push.k_std_model)),
         k_t_std_model=push.k_std_model,
         intercept=line.c,
-        r2=line.r2,
         onset_depth=push.contact.onset,
         onset_depth_std=push.contact.onset_std,
         release_depth=push.contact.release,
         fitted=np.where(inside, fitted, np.nan),
-        x=push.place[:, 0],
-        y=push.place[:, 1],
-        z=push.place[:, 2],
-        inside=inside.astype(np.int64),
-        loading=push.contact.loading.astype(np.int64),
+        **dict(zip("xyz", push.place.T, strict=True)),
     )
 
 

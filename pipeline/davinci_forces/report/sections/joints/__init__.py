@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import Diagnostic, Fit, Identifiability, Residual
+from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,
@@ -14,16 +14,16 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
-    Number,
     OnScreen,
     Panel,
     Prose,
     Section,
     Table,
-    Tiles,
     Verdict,
-    literal,
 )
+from davinci_forces.report.content.inline import literal
+from davinci_forces.report.content.marks import Tiles
+from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators
@@ -78,21 +78,17 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     yield comparison(context, fits)
 
 
-def of_joint(fit: Fit, joint: str) -> list[int]:
-    """The rows of a fit's parameters of this joint alone: not those of links, nor of other joints."""
+def of_joint(fit: Fit, joint: str) -> dict[int, str]:
+    """The rows and names of a fit's parameters of this joint alone: not those of links, nor of other joints."""
     suffix = f" of {joint}" if fit.group != joint else ""
-    return [i for i, name in enumerate(map(str, fit.parameter)) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
-
-
-def own_name(fit: Fit, i: int, joint: str) -> str:
-    """The name of a parameter without the joint that it is of."""
-    return str(fit.parameter[i]).removesuffix(f" of {joint}")
+    own = [i for i, name in enumerate(fit.parameter) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
+    return {i: str(fit.parameter[i]).removesuffix(suffix) for i in own}
 
 
 def equation(joint: str, fit: Fit) -> Equation:
     """The effort of a joint as the sum of the links' effort, if the arm is coupled, and of its own terms."""
     rows = of_joint(fit, joint)
-    names = [own_name(fit, i, joint) for i in rows]
+    names = list(rows.values())
     terms = [f"theta_{number} {fit.phi[i]}".removesuffix(" 1") for number, i in enumerate(rows, start=1)]
     if any(map(is_of_link, fit.phi)):
         terms.insert(0, "sum_j beta_j Y_j (q, dot(q), dot.double(q))")
@@ -103,8 +99,7 @@ def equation(joint: str, fit: Fit) -> Equation:
 def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> str:
     """State what distinguishes the model in use from the joint by itself, and what it gains on unseen data."""
     base = {str(name) for name in plain.parameter}
-    names = [own_name(used, i, joint) for i in of_joint(used, joint)]
-    added = [name for name in names if name not in base]
+    added = [name for name in of_joint(used, joint).values() if name not in base]
     row = context.efforts_of(used).index(joint)
     added = [f"“{name}”" if "," in name else name for name in added]
     changed = [f"it adds {' and '.join(', '.join(added).rsplit(', ', 1))}"] if added else []
@@ -120,7 +115,8 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     by = "least squares (LSE)" if plain.estimator == "lse" else title_of(plain.estimator)
     differences = "; ".join(changed) or "it has the same terms"
     text = f"Compared with the plain model (this joint alone, by {by}): {differences}."
-    predictions = context.used_predictions(joint)
+    every, fit = context.catalogue.select(Prediction, joint=joint), context.used_fit(joint)
+    predictions = [p for p in every if f"{p.model}.{p.estimator}" == fit]
     if all(p.role == "identification" for p in predictions):
         return text
     worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
@@ -134,9 +130,8 @@ def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
     """Each parameter that fits make negative although it is positive in every mechanism, once for all fits."""
     values: dict[str, list[tuple[float, float, str]]] = {}
     for fit in fits:
-        for i in of_joint(fit, joint):
+        for i, name in of_joint(fit, joint).items():
             if fit.theta[i] < 0 and fit.positive[i]:
-                name = own_name(fit, i, joint)
                 values.setdefault(name, []).append((fit.theta[i], fit.theta_std[i], title_of(fit.estimator)))
     for name, negative in values.items():
         clear = [each for each in negative if is_impossible(*each[:2])]
@@ -165,9 +160,8 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
 def scales(context: Context, joint: str, fit: Fit) -> str:
     """State the displacement or velocity within which frictions of a joint reverse or decay; "" without any."""
     parts = []
-    for i in of_joint(fit, joint):
+    for i, name in of_joint(fit, joint).items():
         if fit.scale[i] > 0.0:
-            name = own_name(fit, i, joint)
             unit = "{position}" if name.startswith("presliding") else "{position}/s"
             size = Number(float(fit.scale[i]), format_unit(context.study.robot.joint(joint).unit(unit)), digits=3)
             parts.append(f"{size} ({name})")

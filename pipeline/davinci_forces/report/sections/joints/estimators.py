@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Fit, Residual, SwarmSearch
-from davinci_forces.report.content import Figure, Line, Panel, literal
-from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.content import Figure, Panel, literal
+from davinci_forces.report.content.marks import Colour, Line
 from davinci_forces.report.context import Context, estimator_name, label, title
 
 LOOKS: dict[str, Colour] = {

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import FrictionMap
-from davinci_forces.report.content import Figure, Line, Panel, Points
-from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.content import Figure, Panel
+from davinci_forces.report.content.marks import Colour, Line, Points
 from davinci_forces.report.context import Context, label, name_in_sentence, title
 
 MAX_PANELS = 6  # maps in a figure

@@ -6,7 +6,8 @@ import numpy as np
 
 from davinci_forces.records import Column, Counts, Residual, Trajectory, Whiteness
 from davinci_forces.records.prediction import CHOSEN
-from davinci_forces.report.content import Block, Figure, HBand, Line, Panel, Points, Prose
+from davinci_forces.report.content import Block, Figure, Panel, Prose
+from davinci_forces.report.content.marks import HBand, Line, Points
 from davinci_forces.report.context import Context, fit_name, label
 from davinci_forces.report.sections.parts import autocorrelation, effort_panel, normal_plot, run_name
 from davinci_forces.report.verdicts import percent

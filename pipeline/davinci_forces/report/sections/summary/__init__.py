@@ -6,42 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
-from davinci_forces.report.content import (
-    Block,
-    Bullets,
-    Cell,
-    Figure,
-    HBand,
-    Line,
-    Panel,
-    Points,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-    VSpan,
-    literal,
-)
+from davinci_forces.report import verdicts
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import scored_predictions, trust
-from davinci_forces.report.sections.summary.opening import (
-    as_list,
-    logs_in_words,
-    measurements,
-    nothing_identified,
-    sign_off,
-    verdict_sentence,
-)
-from davinci_forces.report.verdicts import (
-    COVERED,
-    DETECTABLE,
-    DETECTED,
-    GOOD,
-    Trust,
-    band_in_words,
-    is_mostly_constant,
-    percent,
-)
+from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
+from davinci_forces.report.sections.summary import opening
+from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
 from davinci_forces.robots.robot import Kind
 
 SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
@@ -53,24 +24,20 @@ MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
-def section(context: Context) -> Section:
+@section_of("The answer", "summary")
+def section(context: Context) -> Iterator[Block]:
     """The answer on one page."""
-    return Section("The answer", "summary", tuple(blocks(context)))
-
-
-def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
     for task, failed in context.provenance.failures.items():
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
-        yield Prose(f"**{verdict_sentence(context, trusts)}**")
-    if lines := measurements(context):
+        yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
+    if lines := opening.measurements(context):
         yield Bullets(lines)
     if not trusts:
-        yield Prose(logs_in_words(context))
-        yield from nothing_identified(context)
-        yield sign_off(context)
+        yield Prose(opening.logs_in_words(context))
+        yield from opening.nothing_identified(context)
+        yield opening.sign_off(context)
         return
     contacts = context.catalogue.records(Contact)
     yield Prose(opening_paragraph(context, contacts))
@@ -91,7 +58,7 @@ def blocks(context: Context) -> Iterator[Block]:
     if looks := first_looks_in_order(context, trusts):
         yield Prose("**Look at these first.**")
         yield Bullets(looks)
-    yield sign_off(context)
+    yield opening.sign_off(context)
 
 
 def rule_in_words(trusts: list[Trust]) -> str:
@@ -130,7 +97,7 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
         f"{count(len(context.study.logs), 'log')}. "
-        f"{logs_in_words(context)}"
+        f"{opening.logs_in_words(context)}"
     )
     if not contacts:
         contact_logs = any(log.role == "contact" for log in context.study.logs)
@@ -160,7 +127,7 @@ def largest_peaks(context: Context, contacts: list[Contact]) -> str:
         f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)})"
         for joint, (_, log, number) in ((joint, max(largest)) for joint, largest in joints.items())
     ]
-    return f" Largest: {as_list(peaks)}." if peaks else ""
+    return f" Largest: {opening.as_list(peaks)}." if peaks else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -171,7 +138,7 @@ def efforts_in_words(context: Context) -> str:
         (Kind.PRISMATIC, ""): "force [N] at joints that slide",
     }
     currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
-    return as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
+    return opening.as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
@@ -241,23 +208,16 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint."""
-    p, space = trusted.prediction, trusted.space
-    row: list[Cell] = [title(trusted.joint), trusted.words, trusted.new_path]
-    if p is None:
-        row += ["–"] * 4
-    else:
-        r2 = context.number(f"{p.prefix}.r2", 2)
-        ceiling = context.number(f"{p.prefix}.r2_ceiling", 4, std=None)
-        row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
-    key = space.prefix if space is not None else ""
-    row.append(context.number(f"{key}.detection_level", 2))
-    if with_sought:
-        sought = trusted.sought
-        row.append(context.size(space, "detection_level", sought, 3) if space is not None and sought else "–")
-    return (
-        *row,
-        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–",
+    space, sought, share = trusted.space, trusted.sought, percent(trusted.share)
+    scored, free = (about.prefix if about is not None else "" for about in (trusted.prediction, space))
+    error, r2 = context.numbers(scored, ("model_error", "r2"), 2)
+    ceiling, level = context.number(f"{scored}.r2_ceiling", 4, std=None), context.number(f"{free}.detection_level", 2)
+    size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
+    wanted = (size,) if with_sought else ()
+    covers = (
+        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–"
     )
+    return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
 
 
 def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
@@ -295,7 +255,7 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
     """Yield a caveat where the model error calls for caution; it names a constant part that is most of the error."""
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
-    if p is not None and trusted.share > GOOD:
+    if p is not None and trusted.share > verdicts.GOOD:
         error, constant = context.results[f"{p.prefix}.model_error"].number(2), ""
         if is_mostly_constant(p):
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
@@ -304,7 +264,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
         text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
-        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
+        yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
@@ -312,15 +272,15 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
     space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
     if space is None:
         return
-    if trusted.sought and trusted.fineness > DETECTED:
+    if trusted.sought and trusted.fineness > verdicts.DETECTED:
         level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
-        hides = "hides efforts of" if trusted.fineness > DETECTABLE else "is more than a third of"
+        hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         narrow = f"{covers} More logs of free motion, at these speeds and on other days, calibrate it."
-        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
+        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
