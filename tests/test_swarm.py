@@ -105,7 +105,7 @@ def test_a_parameter_that_physics_knows_is_not_negative():
 
 def test_its_history_never_rises_and_ends_at_the_error_of_its_parameters():
     p = problem("hand_pitch")
-    reflecting, clipping = pso.estimate(p).searches
+    reflecting, clipping = pso.estimate(p).run_searches()
     for one in (reflecting, clipping):
         assert (np.diff(one.history) <= 0).all()
         assert one.history[-1] == pytest.approx(np.mean((p.tau - p.Phi @ one.theta) ** 2), rel=1e-9)

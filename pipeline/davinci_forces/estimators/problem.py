@@ -67,7 +67,7 @@ class StandardErrors(NamedTuple):
     classical: Array  # (p,) standard errors for residuals that are uncorrelated and of equal variance
     noise: Array  # (p,) for noise that is correlated and of varying variance
     model: Array  # (p,)
-    lags: float  # the sum of the noise's correlations over all lags but 0
+    lags: float  # over which noise is correlated, each weighted by its correlation
 
     @property
     def total(self) -> Array:
@@ -90,11 +90,11 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters; standard errors and searches are computed at first use, because refits need neither."""
+    """Parameters; standard errors and searches are computed where they are used, because refits need neither."""
 
     theta: Array  # (p,)
     compute_standard_errors: Callable[[], StandardErrors]
-    run_searches: Callable[[], tuple[Search, ...]] = tuple
+    run_searches: Callable[[], tuple[Search, ...]] = tuple  # by every manner of search
 
     @cached_property
     def standard_errors(self) -> StandardErrors:
@@ -102,25 +102,9 @@ class Estimate:
         return self.compute_standard_errors()
 
     @property
-    def searches(self) -> tuple[Search, ...]:
-        """The searches for the parameters, by every manner of search."""
-        return self.run_searches()
-
-    @property
-    def theta_std_classical(self) -> Array:
-        """Standard errors (p,) for residuals that are uncorrelated and of equal variance."""
-        return self.standard_errors.classical
-
-    @property
     def theta_std(self) -> Array:
         """Standard errors (p,) of noise and model together."""
         return self.standard_errors.total
-
-    @property
-    def correlated_lags(self) -> int:
-        """The number of lags over which noise is correlated, each weighted by its correlation."""
-        return round(self.standard_errors.lags)
-
 
 Estimator = Callable[[Regression], Estimate]
 

@@ -133,7 +133,7 @@ def fit_joint(
         estimates[name] = estimate
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
-        yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
+        yield from (swarm_search(model, name, search, regression) for search in estimate.run_searches())
     yield from identifiability(model, regression, estimates, robot, joint, others)
     yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
@@ -271,7 +271,7 @@ def fit_record(
         r2=r2,
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
-        correlated_lags=estimate.correlated_lags,
+        correlated_lags=round(estimate.standard_errors.lags),
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
@@ -281,7 +281,7 @@ def fit_record(
         theta_std=estimate.theta_std,
         theta_std_noise=estimate.standard_errors.noise,
         theta_std_model=estimate.standard_errors.model,
-        theta_std_classical=estimate.theta_std_classical,
+        theta_std_classical=estimate.standard_errors.classical,
     )
 
 
