@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.estimators import lse, pso
 from davinci_forces.estimators.problem import Prior, Regression
+from davinci_forces.estimators.pso import CONSTRICTED, THESIS, search
 from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation import kernels
 from davinci_forces.maths.estimation.least_squares import solve_bounded, triangle
-from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset

@@ -106,6 +106,7 @@ class Estimate:
         """Standard errors (p,) of noise and model together."""
         return self.standard_errors.total
 
+
 Estimator = Callable[[Regression], Estimate]
 
 

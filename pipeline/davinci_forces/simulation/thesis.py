@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from davinci_forces.estimators.pso import MAX_ITERATIONS, PARTICLES, PATIENCE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.estimation.swarm import MAX_ITERATIONS, PARTICLES, PATIENCE
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.models.physical import physical_lumping
