@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.wlse import pool_variance
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.scores import folds
-from davinci_forces.identification.used import Identified
 from davinci_forces.records import (
     Average,
     CrossFit,

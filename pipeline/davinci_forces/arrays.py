@@ -16,7 +16,7 @@ import pandas as pd
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
 from davinci_forces.filters.error_bands import total_variance
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import (
     AnyRecord,

@@ -25,7 +25,7 @@ from davinci_forces.filters.online import (
 )
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.mechanics.kinematics import jacobian
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.records import Choice, Contact, FilterNoise, Fit, JointModel, Motion, Track

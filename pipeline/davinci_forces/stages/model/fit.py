@@ -19,11 +19,11 @@ from davinci_forces.identification.identifiability import (
     moving_with,
     why_not_positive,
 )
-from davinci_forces.identification.left_out import left_out
 from davinci_forces.identification.model_error import model_std
 from davinci_forces.identification.observations import CellEquations, Observed, block_equations, observe, pose_samples
 from davinci_forces.identification.regression import join_regressions, known_of, pose
 from davinci_forces.identification.scores import folds, refits
+from davinci_forces.identification.unseen import left_out
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint, inertia_of

@@ -11,7 +11,7 @@ from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
-from davinci_forces.identification.used import FALLBACK, Identified
+from davinci_forces.identification.joint_models import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.model import ArmMotion, Model
