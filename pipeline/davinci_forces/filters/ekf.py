@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.filters.sample import Belief
 from davinci_forces.filters.stepping import STORED, arguments, correct, covariances, predict, run, transition
 from davinci_forces.maths.compiled import compile_and_store
@@ -32,9 +32,6 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         yield rows, Tracked(*out)
 
 
-track = whole(blocks)
-
-
 def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
     """Compute the log-likelihood of the measurements (2 N): -1/2 sum of (i' S^-1 i + log det 2 pi S).
 
@@ -50,7 +47,7 @@ def step(
     """Filter one sample as it arrives: return the corrected state, and its prediction for the next sample.
 
     `s` is the last prediction, or `sample.first`; `y` are position and velocity; `drive` is the effort less the known
-    effort of other joints.  The results equal those of `track` exactly for the same drive and inertia M.
+    effort of other joints.  The results equal those of `blocks` exactly for the same drive and inertia M.
     """
     corrected, predicted = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))
     return corrected, predicted

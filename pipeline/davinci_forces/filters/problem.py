@@ -1,7 +1,7 @@
 """The input and the output of every filter."""
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -104,7 +104,6 @@ class Tracked(NamedTuple):
 
 Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
 Block = tuple[slice, Tracked]  # some samples of a recording, and what a filter made of them
-BlockFilter = Callable[[Recording, NoiseModel], Iterator[Block]]  # blocks(recording, noise), in any order
 
 
 def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked._fields) -> Tracked:
@@ -114,17 +113,6 @@ def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked.
         for name, column in columns.items():
             column[rows] = getattr(tracked, name)
     return Tracked(**{name: columns.get(name, np.empty(0)) for name in Tracked._fields})
-
-
-@cache
-def whole(blocks: BlockFilter) -> Filter:
-    """Return the filter of a recording in memory, from one that filters it block by block."""
-
-    def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-        [(_, tracked)] = blocks(recording, noise)
-        return tracked
-
-    return track
 
 
 def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool = False) -> list[Recording]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import ekf, sample
+from davinci_forces.filters import ekf, sample, tracker
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
@@ -185,7 +185,7 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     _, noise = _parts(scenario)
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
-    walk = model.q_tau or smallest_q_tau(ekf.track, body.inertia, body.viscous, T_s, model, scenario.filter_delay)
+    walk = model.q_tau or smallest_q_tau(tracker("ekf"), body.inertia, body.viscous, T_s, model, scenario.filter_delay)
     return model._replace(q_tau=walk)
 
 

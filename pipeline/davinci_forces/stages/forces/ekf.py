@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, rts
+from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, tracker
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise, rounding_error
@@ -56,7 +56,7 @@ def track_effort(
     late = lag_error(parts, smoothed, noise)
     variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
-    smooth_rise = rise(rts.track, parts[0], noise)
+    smooth_rise = rise(tracker(SMOOTHER), parts[0], noise)
     rounding = np.concatenate([
         rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
         for part in segments(model.segment)
