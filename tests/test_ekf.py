@@ -24,8 +24,8 @@ from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
-from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
+from davinci_forces.maths.models.terms import bias
 from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness, record
 from davinci_forces.stages.forces import ekf as stage

@@ -16,7 +16,7 @@ from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recor
 from davinci_forces.filters.sample import Belief
 from davinci_forces.filters.stepping import STORED, arguments, correct, covariances, predict, run, transition
 from davinci_forces.maths.compiled import compile_and_store
-from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.terms import Coefficients
 from davinci_forces.maths.signals.windows import TRANSIENT
 
 NAME = "Extended Kalman filter"

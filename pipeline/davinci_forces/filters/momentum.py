@@ -13,7 +13,7 @@ import numpy as np
 
 from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, block_rows, column
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.terms import bias
 
 NAME = "Momentum observer"
 

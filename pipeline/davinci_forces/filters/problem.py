@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, row_blocks
-from davinci_forces.maths.models.bias import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.models.terms import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import JointModel
 

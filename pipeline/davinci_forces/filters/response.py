@@ -24,7 +24,7 @@ from davinci_forces.filters.problem import (
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.contact.detection import STEP_WIDTH, TIP_REACH
-from davinci_forces.maths.models.bias import VISCOUS
+from davinci_forces.maths.models.terms import VISCOUS
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
 

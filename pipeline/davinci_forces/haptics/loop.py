@@ -19,7 +19,7 @@ from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array, records
 from davinci_forces.maths.constants import PUSH_DELAY
-from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.terms import Coefficients
 from davinci_forces.maths.simulation.actuators import Loops
 from davinci_forces.maths.simulation.step import Friction, at_rest
 from davinci_forces.maths.simulation.surroundings import Path

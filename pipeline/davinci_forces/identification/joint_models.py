@@ -20,7 +20,7 @@ from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
 STATIC_FRICTION = ("Coulomb friction", "Stribeck friction")  # parameters that add up at standstill
-# Fields of a record with the coefficients of the bias, in the order of `maths.models.bias`.
+# Fields of a record with the coefficients of the bias, in the order of `maths.models.terms`.
 BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
 MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest singular value are not refitted
 

@@ -13,8 +13,8 @@ from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
 from davinci_forces.identification.joint_models import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.models.terms import COULOMB, VISCOUS
 from davinci_forces.records import (
     Comparison,
     FilterNoise,
