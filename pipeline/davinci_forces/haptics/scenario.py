@@ -105,10 +105,7 @@ class HapticScenario:
 def read(file: Path) -> HapticScenario:
     """Read a scenario.
 
-    Raises
-    ------
-    BadHaptics
-        If the file has problems; the message lists each with its line.
+    Raises BadHaptics if the file has problems; the message lists each with its line.
     """
     table = toml.read(file, BadHaptics)
     scenario = scenario_of(table)

@@ -14,8 +14,7 @@ import numpy as np
 
 from davinci_forces import toml
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.bodies import Bodies, tensors
 from davinci_forces.maths.mechanics.chain import (
     BASE,
     FIXED,
@@ -193,18 +192,13 @@ def _weight(table: TomlTable, row: TableRow) -> tuple[float, ...]:
     mass = table.number("mass", low=0.0, expected="a number of kg")
     centre = table.numbers("centre", [0.0] * 3, 3)
     inertia = table.numbers("inertia", [0.0] * 6, 6, "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
-    if len(inertia) == 6 and np.linalg.eigvalsh(_tensor(inertia))[0] < 0:
+    if len(inertia) == 6 and np.linalg.eigvalsh(tensors(np.array([[0.0] * 4 + [*inertia]])))[0, 0] < 0:
         table.problem(f"inertia {excerpt(list(inertia))} has a negative principal moment, which no body has", "inertia")
     return (mass, *centre, *inertia)
-
-
-def _tensor(inertia: Sequence[float]) -> Array:
-    xx, xy, xz, yy, yz, zz = inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _bodies(weights: Sequence[tuple[float, ...]], chain: Chain) -> Bodies:
     """The bodies of the moving links, in the frames of the dynamics; links without a stated mass have mass 0."""
     stated = np.array([weight or (0.0,) * 10 for weight in weights])
-    tensors = np.array([_tensor(inertia) for inertia in stated[:, 4:].tolist()])
-    return Bodies(stated[:, 0], stated[:, 1:4], tensors, np.zeros(len(stated), np.int64)).in_frames(chain.of_links)
+    bodies = Bodies(stated[:, 0], stated[:, 1:4], tensors(stated), np.zeros(len(stated), np.int64))
+    return bodies.in_frames(chain.of_links)

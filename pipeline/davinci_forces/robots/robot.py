@@ -143,10 +143,7 @@ class Robot:
     def with_tool(self, length: float) -> "Robot":
         """The robot with a tool whose shaft has this length [m].
 
-        Raises
-        ------
-        BadRobot
-            If the tool's part of the chain is unknown.
+        Raises BadRobot if the tool's part of the chain is unknown.
         """
         if self.tool is None or self.chain is None:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
@@ -159,10 +156,7 @@ class Robot:
         Positions, forces and the tip stay in base axes.  Each joint's model gets the gravity terms of this base, and
         loses its published parameters, which are of an upright base.
 
-        Raises
-        ------
-        BadRobot
-            If the robot has no chain, which tells how gravity loads its joints.
+        Raises BadRobot if the robot has no chain, which tells how gravity loads its joints.
         """
         if self.chain is None:
             raise BadRobot(f"robot {self.name} has no chain, so gravity on another base is not known; leave base out")
@@ -228,10 +222,7 @@ class Robot:
     def joint(self, name: str) -> Joint:
         """The joint with this name.
 
-        Raises
-        ------
-        BadRobot
-            If there is no such joint; the message lists the names.
+        Raises BadRobot if there is no such joint; the message lists the names.
         """
         for joint in self.joints:
             if joint.name == name:

@@ -12,7 +12,7 @@ from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
-from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
+from davinci_forces.maths.uncertainty.error_band import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Joint
