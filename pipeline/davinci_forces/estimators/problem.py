@@ -49,15 +49,16 @@ class Regression:
     noise: Array | None = None  # (K,) noise like that of tau, without the motion; None: the residual is taken for it
     model_std: Array | float = 0.0  # (p,) standard errors of the parameters due to the model
     Phi_cov: Array | None = None  # (S, p, p) mean covariance of a row's errors in each log; None: not known
+    weights: Array | None = None  # (K,) of the samples; None: all periods have the same weight
 
     @cached_property
     def weight(self) -> Array:
-        """The weight of each sample (K,) if all periods have the same weight."""
-        return self.periods.astype(float)
+        """The weight of each sample (K,)."""
+        return self.periods.astype(float) if self.weights is None else self.weights
 
     @cached_property
     def triangle(self) -> Triangle:
-        """The QR factors of the samples if all periods have the same weight.  Raises the errors of `factorise`."""
+        """The QR factors of the weighted samples.  Raises the errors of `factorise`."""
         return factorise(self, self.weight)
 
 
@@ -138,28 +139,27 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
 
 
 def standard_errors_by(
-    problem: Regression, weight: Array, theta: Array, Q: Array, D: Array, residual: Array | None = None
+    problem: Regression, theta: Array, Q: Array, D: Array, residual: Array | None = None
 ) -> StandardErrors:
     """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p).
 
     The classical ones follow from the weighted residuals, or from a `residual` (K,) instead.  Those of noise follow
     from the noise of the problem, or from the same residuals if it is not known.
     """
-    root = np.sqrt(weight)
+    root = np.sqrt(problem.weight)
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
-    degrees = int((weight > 0).sum()) - len(theta)
+    degrees = int((problem.weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
     noise = residual if problem.noise is None else root * problem.noise
     variance, lags = correlated_variance(Q, noise, problem.starts, D, degrees)
     return StandardErrors(classical, np.sqrt(variance), np.full(len(theta), problem.model_std), lags)
 
 
-def standard_errors(
-    problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None
-) -> StandardErrors:
+def standard_errors(problem: Regression, theta: Array, residual: Array | None = None) -> StandardErrors:
     """Compute the standard errors of parameters of least squares, or close to them, as `standard_errors_by` does."""
+    R = problem.triangle
     inverse = np.linalg.inv(R.U)
     Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
-    Q *= np.sqrt(weight)[:, None]
-    return standard_errors_by(problem, weight, theta, Q, inverse / R.scale[:, None], residual)
+    Q *= np.sqrt(problem.weight)[:, None]
+    return standard_errors_by(problem, theta, Q, inverse / R.scale[:, None], residual)

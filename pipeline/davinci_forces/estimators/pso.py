@@ -94,12 +94,12 @@ def estimate(problem: Regression) -> Estimate:
 
     The standard errors are those of least squares, which are too large for a parameter at the edge of its box.
     """
-    weight, R = problem.weight, problem.triangle
+    R = problem.triangle
     box = problem.known.box or box_around(R, problem)
     theta = search(R, box, SEED).theta
     return Estimate(
         theta,
-        lambda: standard_errors(problem, weight, R, theta),
+        lambda: standard_errors(problem, theta),
         lambda: tuple(run_search(R, box, problem, manner) for manner in (CONSTRICTED, THESIS)),
     )
 

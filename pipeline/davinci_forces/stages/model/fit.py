@@ -153,9 +153,9 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
     library = Library(every, (), CellEquations(np.zeros(1, int), cells, cells, cells))
     candidates = variants(robot, "independent", {model.group: reach}, [library])
     try:
-        R = regression.triangle
-        noise_std = standard_errors(regression, regression.weight, R, R.theta).noise
-        return model_std(candidates[0].parts[0], R.theta, noise_std, candidates, len(parts))
+        theta = regression.triangle.theta
+        noise_std = standard_errors(regression, theta).noise
+        return model_std(candidates[0].parts[0], theta, noise_std, candidates, len(parts))
     except (NotIdentifiable, np.linalg.LinAlgError):
         return 0.0
 
