@@ -14,7 +14,7 @@ from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.placed import transform
-from davinci_forces.maths.models.physical import PhysicalTable
+from davinci_forces.maths.models.physical import Lumping, PhysicalTable, physical_lumping
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia, lifted_mass, offset
 
 ANYWHERE = (-math.inf, math.inf)
@@ -88,6 +88,12 @@ class Joint:
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
         return self.kind.unit(template, self.effort)
+
+    @property
+    def lumping(self) -> Lumping | None:
+        """The dependence of its parameters on physical ones; None if these are unknown or make other parameters up."""
+        names = tuple(term.name for term in self.terms)
+        return physical_lumping(self.physical, self.gear_ratio, names) if self.physical else None
 
     def terms_under_gravity(self, loaded: bool) -> tuple[Term, ...]:
         """The terms of its model if gravity loads the joint, or does not; a prismatic joint feels a constant force."""

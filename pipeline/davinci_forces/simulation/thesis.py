@@ -5,7 +5,7 @@ here; parameters that it fitted to its recordings are compared with those of a s
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import cache
 from importlib.resources import files
@@ -19,7 +19,6 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.maths.models.physical import physical_lumping
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
 from davinci_forces.robots import davinci, davinci_chain
@@ -147,35 +146,17 @@ def bodies() -> dict[str, Array]:
     return {"l_c2 to l_c9 [m]": centres, **sizes}
 
 
-def factors(joint: Joint, term: Term, monomials: str) -> Array:
-    """The factors of monomials, such as m3 or m3 lc3, in one parameter of a joint."""
+def factors(joint: Joint, rows: Sequence[tuple[str, Term, str]]) -> dict[str, Array]:
+    """The factors of monomials, such as m3 or m3 lc3, in the parameters of a joint, from the chain; by title."""
     assert joint.physical is not None
-    lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    assert lumping is not None
-    place = [x.name.removesuffix("L") for x in joint.physical.parameters]
-    columns = [sorted(i for i in row if i < len(place)) for row in lumping.factors.tolist()]
-    wanted = (sorted(place.index(word) for word in monomial.split()) for monomial in monomials.split(", "))
-    return lumping.coefficients[joint.terms.index(term), [columns.index(monomial) for monomial in wanted]]
-
-
-def roll_factors() -> dict[str, Array]:
-    """The coefficients of (6.7), from the chain."""
-    parts = "m3, m4, m5, m3 lc3, m5 lc5"
+    assert joint.lumping is not None
+    place, coefficients = [x.name.removesuffix("L") for x in joint.physical.parameters], joint.lumping.coefficients
+    columns = [sorted(i for i in row if i < len(place)) for row in joint.lumping.factors.tolist()]
     return {
-        f"factors of {parts} in the inertia": factors(ROLL, inertia, parts),
-        f"of {parts} in the sine": factors(ROLL, gravity_sin, parts),
-    }
-
-
-def pitch_factors() -> dict[str, Array]:
-    """The coefficients of (6.10), from the chain."""
-    bars, wrist, masses = "m3, m5, m3 lc3, m5 lc5", "m6 lc6, m7 lc7, m8 lc8, m9 lc9", "m3, m4, m5, m6, m8"
-    return {
-        f"factors of {bars} in the inertia": factors(PITCH, inertia, bars),
-        f"of {wrist}": factors(PITCH, inertia, wrist),
-        f"of {masses} in the sine": factors(PITCH, gravity_sin, masses),
-        f"of {masses} in the cosine": factors(PITCH, gravity_cos, masses),
-    }
+        title.format(monomials): coefficients[joint.terms.index(term), [
+            columns.index(sorted(map(place.index, monomial.split()))) for monomial in monomials.split(", ")
+        ]] for title, term, monomials in rows
+    }  # fmt: skip
 
 
 def trajectory(joint: Joint, source: str) -> Fourier:
@@ -221,9 +202,8 @@ def parameters(joint: Joint) -> dict[str, Array]:
     MSE(theta) = MSE_LSE + d' (F' F / K) d, d = theta - theta_LSE, for the printed excitation without its misprints.
     """
     assert joint.physical is not None
-    lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    assert lumping is not None
-    guess = lumping.theta(np.array([x.guess for x in joint.physical.parameters]))
+    assert joint.lumping is not None
+    guess = joint.lumping.theta(np.array([x.guess for x in joint.physical.parameters]))
     F = fourier.observation(joint.terms, trajectory(joint, joint.published[-1][0]))
     columns = {column.estimator: column for column in joint.printed}
     least = columns["lse"]
@@ -250,6 +230,17 @@ def measurement_noise() -> dict[str, Array]:
     return {"deviation of position [rad] and velocity [rad/s]": np.array([noise.q, noise.dq])}
 
 
+# The coefficients of (6.7) and (6.10).
+ROLL_FACTORS = (
+    ("factors of {} in the inertia", inertia, "m3, m4, m5, m3 lc3, m5 lc5"),
+    ("of {} in the sine", gravity_sin, "m3, m4, m5, m3 lc3, m5 lc5"),
+)
+PITCH_FACTORS = (
+    ("factors of {} in the inertia", inertia, "m3, m5, m3 lc3, m5 lc5"),
+    ("of {}", inertia, "m6 lc6, m7 lc7, m8 lc8, m9 lc9"),
+    ("of {} in the sine", gravity_sin, "m3, m4, m5, m6, m8"),
+    ("of {} in the cosine", gravity_cos, "m3, m4, m5, m6, m8"),
+)
 # Numbers that need no computation: gains, poses, the size of a swarm and when it ends, and the hanging mass with the
 # scale from the printed force.
 GAINS = {"K_p": np.array(davinci.K_P), "K_i": np.array(davinci.K_I), "K_d": np.array(davinci.K_D)}
@@ -268,8 +259,8 @@ FOUND: dict[str, Callable[[], dict[str, Array]]] = {
     "Table 5.2": lambda: POSES,
     "Table 5.3": lambda: POSES,
     "Table 5.4": lambda: GAINS,
-    "Eq 6.7-6.9": roll_factors,
-    "Eq 6.10-6.12": pitch_factors,
+    "Eq 6.7-6.9": lambda: factors(ROLL, ROLL_FACTORS),
+    "Eq 6.10-6.12": lambda: factors(PITCH, PITCH_FACTORS),
     "Table 6.1": excitation,
     "Table 6.2": limits,
     "Eq 6.28-6.29, Table 6.3": motors,

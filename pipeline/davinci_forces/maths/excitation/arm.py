@@ -59,13 +59,6 @@ class ArmExcitationProblem:
     limits: ArmLimits
 
 
-class ArmDesign(NamedTuple):
-    """The designed trajectory of each joint, and the lowest criterion of each start (starts,)."""
-
-    series: list[Fourier]
-    optima: Array
-
-
 class Stage(NamedTuple):
     """A problem with its bases: what the search needs at each step."""
 
@@ -138,8 +131,8 @@ def parameter_of(problem: ArmExcitationProblem, column: int) -> tuple[int | None
 
 def design_together(
     problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
-) -> ArmDesign:
-    """Design the trajectories of the best of several starts of the search; `report_start` reports each start.
+) -> tuple[list[Fourier], Array]:
+    """Design the trajectories of the best of several starts, and return the criterion of each start (starts,), too.
 
     Raises ValueError if a joint's limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
@@ -148,7 +141,7 @@ def design_together(
     series, optima = best_of_starts(lambda random: _design(problem, random), starts, seed, report_start)
     if not np.isfinite(optima).any():
         raise ValueError("no trajectory of these harmonics within the limits identifies all base parameters of the arm")
-    return ArmDesign(series, optima)
+    return series, optima
 
 
 def _design(problem: ArmExcitationProblem, random: np.random.Generator) -> tuple[list[Fourier], float]:
