@@ -51,7 +51,7 @@ def robot_of(table: TomlTable, stem: str) -> Robot | None:
     table.unique("joint", "name", ((i, joint.name) for i, joint in enumerate(joints) if joint), "two joints are named")
     valid_joints = tuple(joint for joint in joints if joint)
     chain = read_chain(table, valid_joints)
-    table.close()
+    table.close_all()
     return Robot(name, title, valid_joints, *chain) if valid_joints and len(valid_joints) == len(joints) else None
 
 
@@ -98,7 +98,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
     if "effort" in table and "torque_constant" in table:
         table.problem("torque_constant is not used where effort is in A; leave one of them out", "torque_constant")
-    table.close()
+    table.close_all()
     return changed
 
 
@@ -128,7 +128,6 @@ def _limits(table: TomlTable) -> Limits:
     if "effort" in limits:
         effort = limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
         changed = replace(changed, effort=effort)
-    limits.close()
     return changed
 
 
@@ -152,7 +151,6 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     for entry in entries:
         rows.append(_row(entry, [*BASE_NAMES, *(row.name for row in rows)], coordinates, kinds))
         weights.append(_weight(entry, rows[-1]))
-        entry.close()
     table.unique("link", "name", enumerate(row.name for row in rows), "two links are named")
     tip = table.text("tip", rows[-1].name, tuple(row.name for row in rows))
     unmoved = [name for k, name in enumerate(coordinates) if k not in {row.coordinate for row in rows}]
