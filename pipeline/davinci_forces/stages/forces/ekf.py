@@ -120,8 +120,8 @@ def variance_of(model: JointModel, band: ErrorBand | None, own: Array, is_centre
     """The variance (N,) of the smoothed effort, the mean of its standard error, and their source; `total_variance`."""
     if band is None:
         return own**2, 0.0, ""
-    total = total_variance(band, model.log, model.path, model.dq, own, is_centred)
-    return total.variance, float(np.mean(total.std)), total.source
+    variance, std, source = total_variance(band, model.log, model.path, model.dq, own, is_centred)
+    return variance, float(np.mean(std)), source
 
 
 def rms(x: Array) -> float:
