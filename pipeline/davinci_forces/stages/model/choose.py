@@ -166,6 +166,7 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
             candidate=np.array([c.name for c in selection.candidates], object),
             variant=np.array([c.variant for c in selection.candidates], object),
             parameters=np.array([c.size for c in selection.candidates]),
+            **selection.scores,
         )
 
 
