@@ -16,8 +16,7 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
-from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, in_table_frames
+from davinci_forces.robots.davinci import CHAIN, DRIVES, ROBOT, in_table_frames
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory

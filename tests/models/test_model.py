@@ -16,7 +16,7 @@ from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import deflection, efforts, friction_state, pieces
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Motion
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 
 DAHL = terms.presliding_friction(0.01)
 T_S = 0.005

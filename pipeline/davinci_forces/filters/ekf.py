@@ -1,7 +1,4 @@
-"""The extended Kalman filter of one joint, with the external effort as a state, with steps of second order.
-
-    f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
-    x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
+"""The extended Kalman filter of one joint, with the external effort as a state, with the second-order step of `sample`.
 
 Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the acceleration.  This term exceeds an
 encoder's noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.

@@ -21,7 +21,7 @@ from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
-from davinci_forces.robots import davinci, davinci_chain
+from davinci_forces.robots import davinci
 from davinci_forces.robots.robot import Joint
 
 ROUNDING = 1e-9  # of a number that lies half a printed digit away
@@ -133,15 +133,15 @@ def text(results: Mapping[str, tuple[float, float]]) -> str:
 
 def links() -> dict[str, Array]:
     """The parameters of Table 3.1, from the chain."""
-    alpha, a, d, theta = np.array([row[2:6] for row in davinci_chain.CHAIN.table]).T
+    alpha, a, d, theta = np.array([row[2:6] for row in davinci.CHAIN.table]).T
     names = ("a [m]", "d [m]", "alpha [pi/2]", "theta at q = 0 [rad]")
     return dict(zip(names, (a, d, alpha / (pi / 2), theta), strict=True))
 
 
 def bodies() -> dict[str, Array]:
     """The distances of Table 4.1, whose printed signs are part of Eq 4.17, and Table 4.2, with one jaw."""
-    centres = np.abs(davinci_chain.in_table_frames().centres).max(axis=1)[:8]
-    mass, height, radius = np.array([body[:3] for body in davinci_chain.CYLINDERS[:8]]).T
+    centres = np.abs(davinci.in_table_frames().centres).max(axis=1)[:8]
+    mass, height, radius = np.array([body[:3] for body in davinci.CYLINDERS[:8]]).T
     sizes = {"mass of links 2 to 9 [kg]": mass, "height [m]": height, "radius [m]": radius}
     return {"l_c2 to l_c9 [m]": centres, **sizes}
 
@@ -185,7 +185,7 @@ def limits() -> dict[str, Array]:
 def motors() -> dict[str, Array]:
     """The motors of Table 6.3."""
     constants = np.array([joint.torque_constant for joint in davinci.ROBOT.joints])
-    return {"gear ratio of motors 1 to 7": davinci_chain.DRIVES.gear_ratio, "K_m [N m/A] of motors 1 to 3": constants}
+    return {"gear ratio of motors 1 to 7": davinci.DRIVES.gear_ratio, "K_m [N m/A] of motors 1 to 3": constants}
 
 
 def counts() -> dict[str, Array]:
