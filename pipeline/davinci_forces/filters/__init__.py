@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib import import_module
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, Filter, FilterInput, NoiseModel, Recording, Tracked, join_blocks
+from davinci_forces.filters.problem import Block, Filter, NoiseModel, Recording, Tracked, join_blocks
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
@@ -21,13 +21,8 @@ def _filter(name: str) -> Any:
 
 @cache
 def tracker(name: str) -> Filter:
-    """Return the filter of that name, over a recording in memory, which is one block."""
-
-    def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-        [(_, tracked)] = _filter(name).blocks(recording, noise)
-        return cast(Tracked, tracked)
-
-    return track
+    """Return the filter of that name, as a function of one recording and its noise."""
+    return lambda recording, noise: filter_parts(name, [recording], noise)
 
 
 def title(name: str) -> str:

@@ -102,7 +102,7 @@ class Tracked(NamedTuple):
     nis: Array
 
 
-Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
+Filter = Callable[[Recording, NoiseModel], Tracked]
 Block = tuple[slice, Tracked]  # some samples of a recording, and what a filter made of them
 
 
