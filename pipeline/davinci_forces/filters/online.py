@@ -85,11 +85,8 @@ class LinkTree:
         self.placement = [np.array(link["placement"], float)[:3] for link in links]
         self.gravity = gravity * np.array(chain["up"], float)
         self.tip: tuple[int, Array] | None = None
-        if chain.get("tip"):
-            self.tip = (
-                0 if chain["tip"]["link"] is None else chain["tip"]["link"] + 1,
-                np.array(chain["tip"]["position"]),
-            )
+        if tip := chain.get("tip"):
+            self.tip = 0 if tip["link"] is None else tip["link"] + 1, np.array(tip["position"])
 
     def poses(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Rotations (B, 3, 3) and positions (B, 3) of the links in the frames of their parents, at q (B, n)."""
@@ -402,10 +399,8 @@ class Stream:
         if not joint.coupled:
             return 0.0, 0.0
         unit, still = np.eye(len(q))[joint.row], np.zeros_like(q)
-        motions = [np.stack(pair) for pair in ((q, q), (dq, still), (ddq, unit))]
-        tau, M = self.links.efforts(joint.bodies, motions[0], motions[1], motions[2], np.array([1.0, 0.0]))[
-            :, joint.row
-        ]
+        q, dq, ddq = (np.stack(pair) for pair in ((q, q), (dq, still), (ddq, unit)))
+        tau, M = self.links.efforts(joint.bodies, q, dq, ddq, np.array([1.0, 0.0]))[:, joint.row]
         return float(tau), float(M)
 
     def _force(self, q: Array, tau_ext: Array) -> Array:

@@ -130,9 +130,8 @@ def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool 
         part = model.part(which)
         known = part.tau_known if tau_hat is None else part.tau_known + (tau_hat[which] - part.tau_hat)
         q, dq = (part.q, part.dq) if smooth else (part.q_measured, part.dq_measured)
-        return FilterInput(
-            JointDynamics(part.inertia, coefficients, known), q, dq, part.ddq, part.tau, T_s, initial_std
-        )
+        dynamics = JointDynamics(part.inertia, coefficients, known)
+        return FilterInput(dynamics, q, dq, part.ddq, part.tau, T_s, initial_std)
 
     inputs = [LongInput(s.stop - s.start, T_s, initial_std, partial(read, s.start)) for s in segments(model.segment)]
     return [long.part(slice(0, long.samples)) if long.samples <= BLOCK_SAMPLES else long for long in inputs]

@@ -120,13 +120,9 @@ def felt_share(scenario: HapticScenario, frequency: float) -> complex:
 def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, x_0: float, path: Array = NO_PATH) -> LoopRun:
     """Simulate the loop once."""
     stiffness, _ = _parts(scenario)
-    clocks = Clocks(
-        scenario.tick,
-        round(1.0 / scenario.rate / scenario.tick),
-        round(1.0 / scenario.link_rate / scenario.tick),
-        math.ceil(scenario.position_delay / scenario.tick - 1e-9),
-        math.ceil(scenario.force_delay / scenario.tick - 1e-9),
-    )
+    periods = [round(1.0 / rate / scenario.tick) for rate in (scenario.rate, scenario.link_rate)]
+    delays = [math.ceil(x / scenario.tick - 1e-9) for x in (scenario.position_delay, scenario.force_delay)]
+    clocks = Clocks(scenario.tick, *periods, *delays)
     tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
     grip = Grip(*zero_order_hold(hand, scenario.tick), path)
     estimate = filter_in_loop(scenario) if scenario.filtered else lambda reading: reading.force  # sensor at the tip

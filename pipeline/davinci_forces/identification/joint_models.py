@@ -54,13 +54,9 @@ class Identified:
         """Select the parameters (p,) of a joint's friction that are efforts and add up at standstill."""
         suffix = f" of {joint}" if len(self.model(fit).efforts) > 1 else ""
         effort = self.robot.joint(joint).unit("{effort}")
-        names_and_units = zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
-        return np.array(
-            [
-                name.startswith(STATIC_FRICTION) and name.endswith(suffix) and unit == effort
-                for name, unit in names_and_units
-            ]
-        )
+        pairs = zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
+        adds_up = (name.startswith(STATIC_FRICTION) and name.endswith(suffix) and u == effort for name, u in pairs)
+        return np.fromiter(adds_up, np.bool_)
 
     def static_friction(self, fit: Fit, joint: str) -> float:
         """Return the largest friction of a joint at standstill: its friction parameters that are efforts, unsigned."""

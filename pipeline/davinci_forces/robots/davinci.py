@@ -133,9 +133,8 @@ HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
 SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
 TORQUE_CONSTANT = 0.0438  # [N m/A] of every motor; this and the gear ratios are from Table 6.3
 # Hand roll (6.8), hand pitch (6.11) and instrument slide (6.13), without the values that the thesis prints.
-ROLL = Joint(
-    "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, 200.0, TORQUE_CONSTANT
-)
+ROLL_TERMS = (inertia, gravity_sin, viscous, coulomb)
+ROLL = Joint("hand_roll", "Hand roll", Kind.REVOLUTE, ROLL_TERMS, HAND, 200.0, TORQUE_CONSTANT)
 PITCH_TERMS = (inertia, gravity_sin, gravity_cos, viscous, coulomb)
 PITCH = Joint("hand_pitch", "Hand pitch", Kind.REVOLUTE, PITCH_TERMS, HAND, 200.0, TORQUE_CONSTANT)
 SLIDE_TERMS = (lifted_mass, inertia, viscous, coulomb)

@@ -89,9 +89,8 @@ def _search(x: Array) -> Repetition | None:
     longest = max(stop - start for start, stop in spans.values())
     if longest < MIN_RUN_SHARE * n:
         return None
-    lag, (start, stop) = next(
-        (lag, span) for lag, span in spans.items() if span[1] - span[0] >= MIN_LENGTH_RATIO * longest
-    )
+    lag = next(lag for lag, (start, stop) in spans.items() if stop - start >= MIN_LENGTH_RATIO * longest)
+    start, stop = spans[lag]
     core = start + int(differences[lag][start : stop - 2 * lag + 1].argmin())
     exact = _shortest([low for low in lows if low <= lag], points[:, core : core + 2 * lag])
     end = x.shape[1] if stop == n else stop * factor
