@@ -53,13 +53,7 @@ Recording = FilterInput | LongInput
 
 def input_blocks(recording: Recording) -> Iterator[tuple[slice, FilterInput]]:
     """Yield the samples of a recording in blocks."""
-    return ((rows, recording.part(rows)) for rows in block_rows(recording))
-
-
-def block_rows(recording: Recording) -> list[slice]:
-    """Return the samples of each block of a recording; what is in memory is one block."""
-    N = recording.samples
-    return [slice(0, N)] if isinstance(recording, FilterInput) else row_blocks(N)
+    return ((rows, recording.part(rows)) for rows in row_blocks(recording.samples))
 
 
 def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:

@@ -53,13 +53,9 @@ class FeltResponse(NamedTuple):
 
 
 def complete_scenario(
-    scenario: HapticScenario,
-    body: Body = SLIDE,
-    noise: AxisNoise = SLIDE_NOISE,
-    stiffness: float = THESIS_TISSUE,
-    q_tau: float = 0.0,
-    delay: float = PUSH_DELAY,
-) -> HapticScenario:
+    scenario: HapticScenario, body: Body = SLIDE, noise: AxisNoise = SLIDE_NOISE, stiffness: float = THESIS_TISSUE,
+    q_tau: float = 0.0, delay: float = PUSH_DELAY,
+) -> HapticScenario:  # fmt: skip
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body
     return replace(

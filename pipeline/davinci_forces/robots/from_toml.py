@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -131,19 +131,14 @@ def _limits(table: TomlTable) -> Limits:
     return changed
 
 
-class Geometry(NamedTuple):
-    """The chain of a robot, the bodies of its links if known, and its coordinates beyond the joints."""
+def read_chain(table: TomlTable, joints: Sequence[Joint]) -> tuple[Chain | None, Bodies | None, tuple[str, ...]]:
+    """Read the chain of a robot's file, the bodies of its links if known, and its coordinates beyond the joints.
 
-    chain: Chain | None = None
-    bodies: Bodies | None = None
-    wrist: tuple[str, ...] = ()
-
-
-def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
-    """Read the chain that a robot's file describes, with problems noted; empty if it has no [[link]]."""
+    Problems are noted.  Without [[link]] there is no chain.
+    """
     entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
-        return Geometry()
+        return None, None, ()
     convention = table.text("convention", "modified", tuple(CONVENTIONS))
     wrist = tuple(table.take("wrist", [], (list,), "a list of names", lambda names: all(type(x) is str for x in names)))
     kinds = {joint.name: joint.kind for joint in joints}
@@ -160,10 +155,10 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     if len(set(coordinates)) < len(coordinates):
         table.problem("wrist must name each coordinate beyond the joints once", "wrist")
     if table.file.problems():
-        return Geometry()
+        return None, None, ()
     chain = CONVENTIONS[convention](rows, tip)
     moving = [weight for row, weight in zip(rows, weights, strict=True) if row.coordinate != FIXED]
-    return Geometry(chain, _bodies(moving, chain) if any(moving) else None, wrist)
+    return chain, _bodies(moving, chain) if any(moving) else None, wrist
 
 
 def _row(table: TomlTable, parents: list[str], coordinates: list[str], kinds: dict[str, Kind]) -> TableRow:
