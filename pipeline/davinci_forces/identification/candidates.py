@@ -40,7 +40,7 @@ class Library:
     @cached_property
     def inertias(self) -> Array:
         """The columns (S, m, m, p) of M = inertias theta at some poses along the trajectories."""
-        poses = [np.stack([r.q[:: max(1, len(r) // POSES)] for r in log.records], axis=1) for log in self.logs]
+        poses = [np.stack([r.q[:: max(1, len(log.block) // POSES)] for r in log.records], axis=1) for log in self.logs]
         return self.model.inertia_columns(np.concatenate(poses))
 
     @property

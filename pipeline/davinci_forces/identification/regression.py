@@ -96,9 +96,9 @@ def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
 def known_of(joint: Joint) -> Prior:
     """Return the signs that physics requires, and the box of physical parameters with a guess if the robot has one."""
     positive = np.array([term.positive for term in joint.terms])
-    if joint.physical is None or joint.lumping is None or joint.effort:  # a current does not determine the effort
+    if joint.physical is None or joint.dependence is None or joint.effort:  # a current does not determine an effort
         return Prior(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
-    theta = joint.lumping.theta(guess)
+    theta = joint.dependence.theta(guess)
     # A difference of masses that is only rounding is no guess, because a guess is trusted to all its digits.
-    return Prior(positive, Box(lower, upper, joint.lumping), np.where(np.abs(theta) > ROUNDING, theta, 0.0))
+    return Prior(positive, Box(lower, upper, joint.dependence), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

@@ -90,7 +90,7 @@ class Joint:
         return self.kind.unit(template, self.effort)
 
     @property
-    def lumping(self) -> Lumping | None:
+    def dependence(self) -> Lumping | None:
         """The dependence of its parameters on physical ones; None if these are unknown or make other parameters up."""
         names = tuple(term.name for term in self.terms)
         return physical_lumping(self.physical, self.gear_ratio, names) if self.physical else None

@@ -149,9 +149,9 @@ def bodies() -> dict[str, Array]:
 def factors(joint: Joint, rows: Sequence[tuple[str, Term, str]]) -> dict[str, Array]:
     """The factors of monomials, such as m3 or m3 lc3, in the parameters of a joint, from the chain; by title."""
     assert joint.physical is not None
-    assert joint.lumping is not None
-    place, coefficients = [x.name.removesuffix("L") for x in joint.physical.parameters], joint.lumping.coefficients
-    columns = [sorted(i for i in row if i < len(place)) for row in joint.lumping.factors.tolist()]
+    assert joint.dependence is not None
+    place, coefficients = [x.name.removesuffix("L") for x in joint.physical.parameters], joint.dependence.coefficients
+    columns = [sorted(i for i in row if i < len(place)) for row in joint.dependence.factors.tolist()]
     return {
         title.format(monomials): coefficients[joint.terms.index(term), [
             columns.index(sorted(map(place.index, monomial.split()))) for monomial in monomials.split(", ")
@@ -202,8 +202,8 @@ def parameters(joint: Joint) -> dict[str, Array]:
     MSE(theta) = MSE_LSE + d' (F' F / K) d, d = theta - theta_LSE, for the printed excitation without its misprints.
     """
     assert joint.physical is not None
-    assert joint.lumping is not None
-    guess = joint.lumping.theta(np.array([x.guess for x in joint.physical.parameters]))
+    assert joint.dependence is not None
+    guess = joint.dependence.theta(np.array([x.guess for x in joint.physical.parameters]))
     F = fourier.observation(joint.terms, trajectory(joint, joint.published[-1][0]))
     columns = {column.estimator: column for column in joint.printed}
     least = columns["lse"]
