@@ -286,9 +286,8 @@ def _term(p: Mapping[str, Any]) -> TermValue:
     state = p["state"] or {"kind": ""}
     kind = state["function"] if state["kind"] == "function" else state["kind"]
     scale = next((value for key, value in state.items() if key not in ("kind", "function")), 0.0)
-    return TermValue(
-        p["value"], p["acceleration"], tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS), kind, scale
-    )
+    c = tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS)
+    return TermValue(p["value"], p["acceleration"], c, kind, scale)
 
 
 def _state(term: TermValue, memory: float, q: float, dq: float) -> float:

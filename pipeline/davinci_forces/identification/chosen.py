@@ -150,19 +150,17 @@ def parameters(
         errors = total.errors(theta)[0]
         noise = std_over_periods(part, count)
         model = model_std(part, theta, noise, others, count)
-        yield (
-            part,
-            BlockEstimate(
-                theta=theta,
-                theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
-                theta_std_noise=noise,
-                theta_std_model=model,
-                theta_std=np.hypot(noise, model),
-                samples=int(samples.max()),
-                condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
-                **scores(part, theta),
-            ),
+        estimate = BlockEstimate(
+            theta=theta,
+            theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
+            theta_std_noise=noise,
+            theta_std_model=model,
+            theta_std=np.hypot(noise, model),
+            samples=int(samples.max()),
+            condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
+            **scores(part, theta),
         )
+        yield part, estimate
 
 
 def scores(part: CandidatePart, theta: Array) -> dict[str, float]:

@@ -154,6 +154,4 @@ OF_MOTION = {
     )
 }
 
-TERMS = {
-    term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)
-}
+TERMS = {t.name: t for t in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)}
