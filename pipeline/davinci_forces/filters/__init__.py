@@ -15,6 +15,7 @@ DEFAULT = "ekf"  # the other filters are compared with this one
 MAX_NIS_RATIO = 50.0  # of the mean normalised innovation squared to 2, the mean of a consistent filter
 
 
+@cache
 def _filter(name: str) -> Any:
     return import_module(f"davinci_forces.filters.{name}")
 
