@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.exports import renderer
-from davinci_forces.filters import ekf
+from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import LogModels
@@ -94,7 +94,7 @@ def same_along_logs(export, folder: Path) -> int:
                 [tuned], q_tau = export.catalogue.select(FilterNoise, joint=joint.name), export.study.settings.q_tau
                 noise = noise_model(tuned, joint.joint, 1.0 / m.rate, q_tau)
                 start = joint.filter["initial_std"]
-                passes = [ekf.track(part._replace(initial_std=start), noise) for part in filter_inputs(m)]
+                passes = [tracker("ekf")(part._replace(initial_std=start), noise) for part in filter_inputs(m)]
                 rows = []
                 compiled.restart()
                 for k in range(len(m)):

@@ -29,8 +29,7 @@ from davinci_forces.maths.uncertainty.bootstrap import (
     root_mean_square,
     standard_error,
 )
-from davinci_forces.maths.uncertainty.day_offset import day_offset
-from davinci_forces.maths.uncertainty.error_band import levels
+from davinci_forces.maths.uncertainty.error_band import day_offset, levels
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track
 from davinci_forces.report.content import Number
 from davinci_forces.report.sections.contacts import interval, largest

@@ -14,7 +14,7 @@ from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results
 from davinci_forces.report.sections.robot import section
 from davinci_forces.robots import davinci, dvrk_psm, from_toml
-from davinci_forces.robots.davinci_chain import DRIVES
+from davinci_forces.robots.davinci import DRIVES
 from davinci_forces.stages import design
 from davinci_forces.study import Settings, Study
 from tests.guide import make_logs

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces import filters
 from davinci_forces.errors import PipelineError
-from davinci_forces.filters import ekf, problem, rts, sample, tracker
+from davinci_forces.filters import ekf, problem, sample, tracker
 from davinci_forces.filters.error_bands import free_errors, total_variance
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import (
@@ -24,8 +24,8 @@ from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
-from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
+from davinci_forces.maths.models.terms import bias
 from davinci_forces.maths.uncertainty.error_band import calibrate
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness, record
 from davinci_forces.stages.forces import ekf as stage
@@ -85,7 +85,7 @@ def matched(name, seed=0, N=6000):
 @pytest.mark.parametrize("name", arm.THETA)
 def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
     recording, tau_ext = matched(name)
-    made, kept = ekf.track(recording, NOISE), slice(200, None)
+    made, kept = tracker("ekf")(recording, NOISE), slice(200, None)
     # NIS of two measurements has a variance of 4; four standard errors of its mean are let.
     assert made.nis[kept].mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(5800))
     for x, r in ((made.innovation_q[kept], NOISE.r_q), (made.innovation_dq[kept], NOISE.r_dq)):
@@ -101,7 +101,7 @@ def test_stated_deviations_and_innovations_of_two_hundred_matched_runs_are_right
     errors, nis, white = [], [], []
     for seed in range(200):
         recording, tau_ext = matched("hand_pitch", seed, 2000)
-        made, kept = ekf.track(recording, NOISE), slice(200, None)
+        made, kept = tracker("ekf")(recording, NOISE), slice(200, None)
         errors.append(((made.tau_ext - tau_ext) / made.tau_ext_std)[kept])
         nis.append(made.nis[kept].mean())
         white.append(whiteness.statistics(made.innovation_dq[kept])["ljung_box_p"] > 0.05)
@@ -116,7 +116,7 @@ def test_the_steady_state_is_the_riccati_solution():
 
     used, theta = arm.joint("hand_pitch").terms, np.array([0.2384, 0.0, 0.0, 0.9064, 0.0])
     still = np.zeros(4000)
-    made = ekf.track(recorded(used, theta, (still, still), still), NOISE)
+    made = tracker("ekf")(recorded(used, theta, (still, still), still), NOISE)
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, T_S)
     A = np.array([[0, 1, 0], [0, -theta[3] / theta[0], -1 / theta[0]], [0, 0, 0]])
     F, H = np.eye(3) + T_S * A + 0.5 * T_S**2 * A @ A, np.eye(2, 3)
@@ -128,7 +128,7 @@ def test_the_steady_state_is_the_riccati_solution():
 
 def test_one_sample_at_a_time_is_the_whole_recording_at_once():
     recording, _ = matched("hand_roll", N=500)
-    made = ekf.track(recording, NOISE)
+    made = tracker("ekf")(recording, NOISE)
     s = sample.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.initial_std)
     joint = recording.joint
     for k, y in enumerate(zip(recording.q, recording.dq, strict=True)):
@@ -176,10 +176,10 @@ def test_the_push_of_section_7_3_is_found_as_well_as_any_walk_would_and_smoothed
         return np.sqrt(np.mean((track(recording, noise._replace(q_tau=walk_of)).tau_ext - tau_ext)[kept] ** 2))
 
     tried = np.geomspace(1e-4, 1.0, 33)
-    best = min(rmse(ekf.track, q_tau) for q_tau in tried)
+    best = min(rmse(tracker("ekf"), q_tau) for q_tau in tried)
     found = likeliest_walk([recording], noise)
-    assert rmse(ekf.track, found) <= 1.02 * best
-    assert rmse(rts.track, found) <= 0.5 * rmse(ekf.track, found)
+    assert rmse(tracker("ekf"), found) <= 1.02 * best
+    assert rmse(tracker("rts"), found) <= 0.5 * rmse(tracker("ekf"), found)
 
 
 def test_tuning_finds_the_noise_that_was_put_in():
@@ -194,7 +194,7 @@ def test_tuning_finds_the_noise_that_was_put_in():
     assert_allclose(found[:2], true[:2], rtol=0.1)
     # The walk that a push needs explains some of what moves the joint.
     assert 0.8 * true.q_dq < found.q_dq < true.q_dq
-    assert found.q_tau == smallest_q_tau(ekf.track, theta[0], theta[2], T_S, found)
+    assert found.q_tau == smallest_q_tau(tracker("ekf"), theta[0], theta[2], T_S, found)
 
 
 def test_the_slowest_walk_is_the_least_with_which_a_push_is_shown():
@@ -215,9 +215,9 @@ def test_the_lag_is_what_the_filter_misses_of_a_push():
     push, still = np.clip(1 - np.abs(t - 10.0), 0, None), np.zeros(2000)
     fast = NOISE._replace(q_tau=1.0)
     recording = recorded(arm.joint("hand_roll").terms, np.array([0.4528, 0.0, 0.3706, 0.0]), (still, still), push)
-    smooth = rts.track(recording, fast).tau_ext
+    smooth = tracker("rts")(recording, fast).tau_ext
     late = lag_error([recording], smooth, fast)
-    missed = push - ekf.track(recording, fast).tau_ext
+    missed = push - tracker("ekf")(recording, fast).tau_ext
     assert np.abs(missed).max() > 0.01
     assert_allclose(late, missed, atol=0.35 * np.abs(missed).max())  # the smoother rounds the corners
     assert np.abs(smooth - push).max() < np.abs(missed).max()
@@ -231,7 +231,7 @@ def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
     drive = 4.5 * np.sin(3 * t)
     held = -theta[0] * 9.81 - weight  # gravity pulls the slide along +q
     y = simulate(used, theta, np.full(N, -weight), drive + held, NOISE)
-    made = ekf.track(recorded(used, theta, y, drive + held, 5.0), NOISE)
+    made = tracker("ekf")(recorded(used, theta, y, drive + held, 5.0), NOISE)
     assert made.tau_ext[1000:].mean() == pytest.approx(-weight, abs=0.05)
 
 
@@ -294,11 +294,13 @@ def test_the_slowest_walk_at_a_high_rate_shows_a_push_and_takes_no_trials_of_tha
 
     def track(recording, noise):
         samples.append(recording.samples)
-        return ekf.track(recording, noise)
+        return tracker("ekf")(recording, noise)
 
     walk = smallest_q_tau(track, 0.4, 0.3, T_s, noise)
     assert max(samples) < 50_000 < 4.0 / T_s
-    shown, slower = (push_response_at_rest(ekf.track, 0.4, 0.3, T_s, noise._replace(q_tau=x * walk)) for x in (1, 0.98))
+    shown, slower = (
+        push_response_at_rest(tracker("ekf"), 0.4, 0.3, T_s, noise._replace(q_tau=x * walk)) for x in (1, 0.98)
+    )
     assert shown.share > 0.9 - 1e-3
     assert shown.delay < 0.1 + 1e-3
     assert slower.share < 0.9 or slower.delay > 0.1
@@ -310,9 +312,9 @@ def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_
     walks = [noise_model(noise, which, T_S, q_tau).q_tau / np.sqrt(T_S) for which, q_tau in ((own, 0.7), (own, 0.0))]
     assert_allclose(walks, [0.7, 0.3])
     found = noise_model(noise, joint, T_S, 0.0)
-    assert found.q_tau == smallest_q_tau(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
+    assert found.q_tau == smallest_q_tau(tracker("ekf"), noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
     quick = noise_model(replace(noise, delay=0.02), joint, T_S, 0.0)
-    shown = push_response_at_rest(ekf.track, noise.inertia, noise.viscous, T_S, quick)
+    shown = push_response_at_rest(tracker("ekf"), noise.inertia, noise.viscous, T_S, quick)
     assert shown.delay <= 0.02 + 1e-9
     assert quick.q_tau > found.q_tau
     assert noise_model(replace(noise, delay=0.02), own, T_S, 0.0).q_tau == pytest.approx(0.3 * np.sqrt(T_S))
@@ -480,11 +482,11 @@ def test_the_variance_of_a_band_has_twice_the_relative_error_of_its_deviation():
     errors, blocks = (free_errors(band, False) for band in (others, itself))
     left_out = [(slice(10 * i, 10 * i + 10), calibrate(blocks.select(blocks.block != i))) for i in range(6)]
     for about, parts in ((others, [(slice(None), calibrate(errors))]), (itself, left_out)):
-        total = total_variance(about, "run", "another path", dq, own, False)
+        total, std, _ = total_variance(about, "run", "another path", dq, own, False)
         for rows, calibration in parts:
             variance = calibration.variance(own[rows], dq[rows])
-            assert_allclose(total.variance[rows], variance)
-            assert_allclose(total.std[rows], 2.0 * calibration.relative_std * variance)
+            assert_allclose(total[rows], variance)
+            assert_allclose(std[rows], 2.0 * calibration.relative_std * variance)
 
 
 def test_a_test_push_is_a_half_sine_of_one_second_and_its_delay_that_of_the_largest_estimate():

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.wlse import pool_variance
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.scores import folds
-from davinci_forces.identification.used import Identified
 from davinci_forces.records import (
     Average,
     CrossFit,
@@ -106,7 +106,7 @@ def test_weights_gain_where_noise_differs_over_the_period():
 def test_correlated_residuals_widen_the_stated_errors_to_those_there_are():
     answers = [(estimator("lse")(p), theta) for p, theta in (problem(seed=s, rho=0.9, K=2000) for s in range(200))]
     stated = np.std([(a.theta - theta) / a.theta_std for a, theta in answers], axis=0)
-    classical = np.std([(a.theta - theta) / a.theta_std_classical for a, theta in answers], axis=0)
+    classical = np.std([(a.theta - theta) / a.standard_errors.classical for a, theta in answers], axis=0)
     assert (classical[:2] > 2.0).all()
     assert_allclose(stated[:2], 1.0, atol=4 / np.sqrt(2 * 200))
 
@@ -142,7 +142,7 @@ def test_pooling_keeps_the_mean_variance_and_never_leaves_a_weight_infinite(K, M
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
 def test_residuals_are_said_to_be_correlated_over_as_many_lags_as_they_are(rho):
     """The correlations of a first-order autoregression at all lags but 0 sum to 2 rho / (1 - rho)."""
-    lags = [estimator("lse")(problem(seed=s, rho=rho, K=2000)[0]).correlated_lags for s in range(20)]
+    lags = [estimator("lse")(problem(seed=s, rho=rho, K=2000)[0]).standard_errors.lags for s in range(20)]
     assert np.median(lags) == pytest.approx(2 * rho / (1 - rho), rel=0.15, abs=0.5)
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from davinci_forces.identification.joint_models import LogModels
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.records import Fit, JointModel
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import coupled_arm, independent

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.exports import renderer
-from davinci_forces.filters import ekf
+from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import FilterInput
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
@@ -40,7 +40,7 @@ def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
         whole = FilterInput(dynamics, q, dq, moved.ddq[:, i], tau, 1.0 / RATE, 0.7)
         parts = [whole.part(slice(0, halves[0])), whole.part(slice(halves[0], N))]
         expected = np.concatenate(
-            [[x.tau_ext, x.tau_ext_std] for x in (ekf.track(part, NOISE) for part in parts)], axis=1
+            [[x.tau_ext, x.tau_ext_std] for x in (tracker("ekf")(part, NOISE) for part in parts)], axis=1
         )
         compiled.restart()
         rows = []

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters.problem import filter_inputs
-from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.models.terms import bias
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std, share_passed
 from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Residual, Signal
 from davinci_forces.stages.model import choose, fit, predict

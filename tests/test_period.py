@@ -12,7 +12,7 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.periods import period
 from davinci_forces.maths.periods.agreement import differing_periods, stretch
 from davinci_forces.maths.periods.repetition import repetition, vertex
-from davinci_forces.maths.periods.steps import REACH, steps
+from davinci_forces.maths.signals.faults import REACH, steps
 from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
 from davinci_forces.stages.model import fit
 from davinci_forces.stages.recordings import average, differentiate

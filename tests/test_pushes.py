@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from davinci_forces.filters import ekf, rts
+from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import NoiseModel, stationary_joint
 from davinci_forces.filters.response import rise, rounding_error, smallest_q_tau
 from davinci_forces.maths.contact.detection import events
@@ -14,7 +14,7 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 T_S, INERTIA, VISCOUS, START = 0.01, 0.3, 0.3, 10.0
 T = T_S * np.arange(2000)
 STARTS = NoiseModel(r_q=1e-5, r_dq=2e-3, q_q=0.0, q_dq=0.14 * T_S / INERTIA, q_tau=0.0)
-NOISE = STARTS._replace(q_tau=smallest_q_tau(ekf.track, INERTIA, VISCOUS, T_S, STARTS))
+NOISE = STARTS._replace(q_tau=smallest_q_tau(tracker("ekf"), INERTIA, VISCOUS, T_S, STARTS))
 SHAPES = {  # of the share of its duration that has passed
     "step": np.ones_like,
     "triangle": lambda x: 1.0 - np.abs(2.0 * x - 1.0),
@@ -43,7 +43,7 @@ def smoothed(shape, duration, peak, seed):
     joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, true + 0.14 * chance.normal(size=len(T)), T_S, 1.0)
     q, dq = (std * chance.normal(size=len(T)) for std in (NOISE.r_q, NOISE.r_dq))
     joint = joint._replace(q=q, dq=dq)
-    made, spread = rts.track(joint, NOISE), rise(rts.track, joint, NOISE)
+    made, spread = tracker("rts")(joint, NOISE), rise(tracker("rts"), joint, NOISE)
     return true, made.tau_ext, made.tau_ext_std, rounding_error(made.tau_ext, made.tau_ext_std**2, T_S, spread), spread
 
 
@@ -102,10 +102,10 @@ def test_times_of_contact_have_the_errors_that_are_stated():
 def test_a_flank_begins_within_its_error_whatever_the_smoother_s_step_is_like(flank, r_dq, rise_of):
     """Without noise.  By a step's steepest slope soft flanks were up to 4 errors off."""
     noise = STARTS._replace(r_dq=r_dq)
-    noise = noise._replace(q_tau=smallest_q_tau(ekf.track, INERTIA, VISCOUS, T_S, noise))
+    noise = noise._replace(q_tau=smallest_q_tau(tracker("ekf"), INERTIA, VISCOUS, T_S, noise))
     rising, falling = (rise_of(np.clip(x / flank, 0.0, 1.0)) for x in (T - START, START + 3.0 - T))
     joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, rising * falling, T_S, 1.0)
-    effort, spread = rts.track(joint, noise).tau_ext, rise(rts.track, joint, noise)
+    effort, spread = tracker("rts")(joint, noise).tau_ext, rise(tracker("rts"), joint, noise)
     [found] = events(T, effort, np.full(len(T), 1e-3), 0.05, spread)
     assert abs(found.onset - START) < 1.25 * found.onset_std
     assert abs(found.release - START - 3.0) < 1.25 * found.release_std

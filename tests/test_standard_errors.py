@@ -65,7 +65,7 @@ def scores(averages: list[Average], rho: float, white: float = 0.0, seeds: int =
             tau, var = p.Phi @ theta + NOISE * noise.mean, NOISE**2 * noise.var
             found = estimator(name)(Regression(p.Phi, tau, var, p.periods, p.starts, p.names))
             stated[joint].append((found.theta - theta) / found.theta_std)
-            classical[joint].append((found.theta - theta) / found.theta_std_classical)
+            classical[joint].append((found.theta - theta) / found.standard_errors.classical)
     return stated, classical
 
 

@@ -8,16 +8,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.estimators import lse, pso
 from davinci_forces.estimators.problem import Prior, Regression
+from davinci_forces.estimators.pso import CONSTRICTED, THESIS, search
 from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation import kernels
 from davinci_forces.maths.estimation.least_squares import solve_bounded, triangle
-from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
-from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, in_table_frames
+from davinci_forces.robots.davinci import CHAIN, DRIVES, ROBOT, in_table_frames
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
@@ -105,7 +104,7 @@ def test_a_parameter_that_physics_knows_is_not_negative():
 
 def test_its_history_never_rises_and_ends_at_the_error_of_its_parameters():
     p = problem("hand_pitch")
-    reflecting, clipping = pso.estimate(p).searches
+    reflecting, clipping = pso.estimate(p).run_searches()
     for one in (reflecting, clipping):
         assert (np.diff(one.history) <= 0).all()
         assert one.history[-1] == pytest.approx(np.mean((p.tau - p.Phi @ one.theta) ** 2), rel=1e-9)

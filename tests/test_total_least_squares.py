@@ -71,7 +71,7 @@ def test_classical_errors_are_as_large_as_those_that_noise_of_the_motion_makes_a
     """White noise in the columns is taken for correlation, so that stated errors are too large."""
     found = [estimator("tls")(measured(seed)) for seed in range(SEEDS)]
     off = np.array([e.theta - arm.THETA["hand_roll"] for e in found])
-    z, stated = (off / np.array([getattr(e, std) for e in found]) for std in ("theta_std_classical", "theta_std"))
+    z, stated = (off / np.array([getattr(e.standard_errors, std) for e in found]) for std in ("classical", "total"))
     assert_allclose(z.std(axis=0), 1.0, atol=4 / np.sqrt(2 * SEEDS))
     assert (stated.std(axis=0) < 1.0).all()
 
@@ -80,7 +80,7 @@ def test_where_the_motion_is_exact_total_least_squares_are_least_squares():
     total, plain = (estimator(name)(problem(1)) for name in ("tls", "lse"))
     assert_array_equal(total.theta, plain.theta)
     assert_allclose(total.theta_std, plain.theta_std, rtol=1e-12)
-    assert_allclose(total.theta_std_classical, plain.theta_std_classical, rtol=1e-12)
+    assert_allclose(total.standard_errors.classical, plain.standard_errors.classical, rtol=1e-12)
 
 
 def test_with_noise_of_one_size_everywhere_it_is_the_textbook_s_smallest_singular_vector():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from davinci_forces.filters import ekf
+from davinci_forces.filters import ekf, tracker
 from davinci_forces.filters.innovations import coloured
 from davinci_forces.filters.innovations.innovations import correct_times, delays, innovations
 from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
@@ -121,7 +121,7 @@ def test_the_cross_correlation_is_the_one_by_hand_with_what_came_before():
 
 def test_innovations_are_those_of_the_filter_and_each_as_large_as_stated():
     recording, _ = matched(NAME, N=N)
-    own, made = innovations(recording, NOISE), ekf.track(recording, NOISE)
+    own, made = innovations(recording, NOISE), tracker("ekf")(recording, NOISE)
     assert_array_equal(own.q, made.innovation_q)
     assert_array_equal(own.dq, made.innovation_dq)
     low, high = whiteness.mean_square_band(N - 200)
@@ -131,7 +131,7 @@ def test_innovations_are_those_of_the_filter_and_each_as_large_as_stated():
 
 def test_without_memory_the_coloured_filter_is_the_plain_one():
     recording, _ = matched("hand_roll", N=500)
-    plain, own = coloured.Noise(NOISE, coloured.UNCOLOURED), ekf.track(recording, NOISE)
+    plain, own = coloured.Noise(NOISE, coloured.UNCOLOURED), tracker("ekf")(recording, NOISE)
     i_q, i_dq = coloured.innovations(recording, plain)
     assert_allclose(i_q, own.innovation_q, atol=1e-11)
     assert_allclose(i_dq, own.innovation_dq, atol=1e-10)

@@ -16,7 +16,7 @@ import pandas as pd
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
 from davinci_forces.filters.error_bands import total_variance
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import (
     AnyRecord,
@@ -242,7 +242,7 @@ class IdentifiedArm:
         std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
         if band is not None:
             smoothed = np.full(len(model), np.sqrt(np.mean(band.tau_ext_std_filter**2)))
-            std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False).variance)
+            std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False)[0])
         return pd.DataFrame({"tau": model.tau_hat, "std": std}, index=pd.Index(model.t, name="t"))
 
     def _saved(self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED) -> LogEntry:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.estimators import estimator, wlse
+from davinci_forces.estimators import estimator, pso, wlse
 from davinci_forces.estimators.problem import Regression
-from davinci_forces.maths.estimation import swarm
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.robots.davinci import ROBOT
 from tests.test_swarm import problem
@@ -96,9 +95,9 @@ def test_a_swarm_takes_a_fifteenth_of_the_time_of_pyswarms(name, capsys, monkeyp
     rival = pytest.importorskip("pyswarms.single", reason=reason)
     p = problem(name)
     R, box = triangle(p.Phi, p.tau, p.periods.astype(float)), p.known.box
-    monkeypatch.setattr(swarm, "MAX_ITERATIONS", 1000)
-    monkeypatch.setattr(swarm, "CHANGE", -1.0)  # so that it does not stop early
-    manner = swarm.CONSTRICTED
+    monkeypatch.setattr(pso, "MAX_ITERATIONS", 1000)
+    monkeypatch.setattr(pso, "CHANGE", -1.0)  # so that it does not stop early
+    manner = pso.CONSTRICTED
     options = {"c1": manner.cognitive, "c2": manner.social, "w": manner.inertia[0]}
     bounds = (box.lower, box.upper)
 
@@ -106,12 +105,12 @@ def test_a_swarm_takes_a_fifteenth_of_the_time_of_pyswarms(name, capsys, monkeyp
     theirs_least: list[float] = []
 
     def ours():
-        found = swarm.swarm(R, box, np.random.default_rng(0), manner)
+        found = pso.swarm(R, box, np.random.default_rng(0), manner)
         assert len(found.history) == 1000
         least.append(found.history[-1])
 
     def theirs():
-        search = rival.GlobalBestPSO(swarm.PARTICLES, len(box.lower), options, bounds=bounds, bh_strategy="reflective")
+        search = rival.GlobalBestPSO(pso.PARTICLES, len(box.lower), options, bounds=bounds, bh_strategy="reflective")
         cost, _ = search.optimize(lambda x: R.excess(box.lumping.theta(x)), iters=1000, verbose=False)
         theirs_least.append(cost + R.min_squares)
 

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.filters import rts
+from davinci_forces.filters import tracker
 from davinci_forces.filters.ekf import track
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
@@ -91,10 +91,10 @@ def test_a_million_samples_take_at_most_a_fifth_longer_than_in_cpp(rival, capsys
 
 
 def test_the_smoother_takes_at_most_two_and_a_half_times_as_long_as_the_filter(capsys):
-    filter_, smoother = (f(recording(), NOISE) for f in (track, rts.track))  # compiles, or reads what was compiled
+    filter_, smoother = (f(recording(), NOISE) for f in (track, tracker("rts")))  # compiles, or reads what was compiled
     assert_allclose(smoother.tau_ext[-1], filter_.tau_ext[-1], rtol=1e-9)  # the last sample has nothing after it
     assert smoother.tau_ext_std[N // 2] < filter_.tau_ext_std[N // 2]
-    filtered, smoothed = shortest(lambda made: track(made, NOISE), lambda made: rts.track(made, NOISE))
+    filtered, smoothed = shortest(lambda made: track(made, NOISE), lambda made: tracker("rts")(made, NOISE))
     said(capsys, f"filter and smoother of 1e6 samples: {smoothed / filtered:.2f} times the filter")
     assert smoothed <= 2.5 * filtered
 

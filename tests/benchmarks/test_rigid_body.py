@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import rigid_body
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 from tests.robot.pinocchio_arm import Tree, tree
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio, the rival, is not installed: `make bench` installs it")

@@ -17,8 +17,8 @@ from davinci_forces.maths.simulation import continuous
 from davinci_forces.maths.simulation.surroundings import triangle
 from davinci_forces.records import KINDS, Record, Signal, store
 from davinci_forces.records.catalogue import Catalogue
-from davinci_forces.robots import Robot, davinci, davinci_chain
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots import Robot, davinci
+from davinci_forces.robots.davinci import BODIES, CHAIN
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.ledger import Folders, Ledger
 from davinci_forces.runner.plan import Plan
@@ -61,7 +61,7 @@ def robot() -> Robot:
     published = (("table-6.1-corrected", arm.EXCITATION["hand_roll"]),)
     short = tuple(replace(study, duration=0.05) for study in davinci.ROBOT.control)
     joints, wrist = (
-        (replace(roll, published=published, physical=davinci_chain.ROLL_PARTS, printed=davinci.ROLL_PRINTED), *others),
+        (replace(roll, published=published, physical=davinci.ROLL_PARTS, printed=davinci.ROLL_PRINTED), *others),
         davinci.ROBOT.wrist,
     )
     return replace(arm.ARM, joints=joints, chain=CHAIN, bodies=BODIES, wrist=wrist, control=short)

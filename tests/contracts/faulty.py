@@ -9,7 +9,7 @@ import numpy as np
 from davinci_forces.maths.contact.weighing import unit_load
 from davinci_forces.maths.simulation.surroundings import triangle
 from davinci_forces.records import Signal
-from davinci_forces.robots.davinci_chain import CHAIN
+from davinci_forces.robots.davinci import CHAIN
 from tests import arm
 
 RATE = 100.0

@@ -72,7 +72,7 @@ def test_without_noise_the_parameters_come_out_to_rounding(estimate: Estimator, 
     p = frozen(replace(problem(), tau_var=np.full(K, tau_var)))
     found = estimate(p)
     agree(found.theta, THETA)
-    assert np.isfinite([found.theta, found.theta_std_classical, found.theta_std]).all()
+    assert np.isfinite([found.theta, found.standard_errors.classical, found.theta_std]).all()
 
 
 @ESTIMATOR
@@ -86,7 +86,7 @@ def test_columns_that_are_hard_to_tell_apart_cost_their_condition_number_and_not
 @ESTIMATOR
 def test_errors_are_as_large_as_stated(estimate: Estimator):
     found = [estimate(problem(seed)) for seed in range(SEEDS)]
-    for std in ("theta_std_classical", "theta_std"):
+    for std in ("classical", "total"):
         is_calibrated(found, std, bias(estimate))
 
 
@@ -95,7 +95,7 @@ def test_errors_are_as_large_as_stated_where_noise_differs_over_the_period(estim
     """By the deviations that allow for it: it is loud where gravity's column is large, and tells most."""
     size = np.abs(PHI[:, 1])
     loud = SIGMA * np.where(size > np.quantile(size, 0.7), 4.0, 1.0)
-    is_calibrated([estimate(problem(seed, loud)) for seed in range(SEEDS)], "theta_std", bias(estimate))
+    is_calibrated([estimate(problem(seed, loud)) for seed in range(SEEDS)], "total", bias(estimate))
 
 
 def bias(estimate: Estimator) -> float:
@@ -104,7 +104,7 @@ def bias(estimate: Estimator) -> float:
 
 def is_calibrated(found: list[Estimate], std: str, bias: float) -> None:
     """The standard error of n scores' mean is 1/sqrt(n), that of their deviation 1/sqrt(2 n); four of each are let."""
-    scores = np.array([(e.theta - THETA) / getattr(e, std) for e in found])
+    scores = np.array([(e.theta - THETA) / getattr(e.standard_errors, std) for e in found])
     assert_allclose(scores.mean(axis=0), 0.0, atol=4 / np.sqrt(SEEDS) + bias, err_msg=std)
     assert_allclose(scores.std(axis=0), 1.0, atol=4 / np.sqrt(2 * SEEDS), err_msg=std)
 
@@ -118,7 +118,7 @@ def test_scaling_a_column_scales_its_parameter_and_nothing_else(estimate: Estima
     agree(scaled.theta * scale, plain.theta)
     # Deviations lose what the square of the condition number loses, through (Phi' Phi)^-1.
     tolerance = rounding(PHI) * np.linalg.cond(PHI / np.linalg.norm(PHI, axis=0))
-    assert_allclose(scaled.theta_std_classical * scale, plain.theta_std_classical, rtol=tolerance)
+    assert_allclose(scaled.standard_errors.classical * scale, plain.standard_errors.classical, rtol=tolerance)
     assert_allclose(scaled.theta_std * scale, plain.theta_std, rtol=tolerance)
 
 
@@ -131,7 +131,7 @@ def test_the_order_of_the_logs_does_not_matter(estimate: Estimator):
 @ESTIMATOR
 def test_two_logs_tell_more_than_one(estimate: Estimator):
     a, b = problem(seed=1), problem(seed=2)
-    assert (estimate(pooled(a, b)).theta_std_classical < estimate(a).theta_std_classical).all()
+    assert (estimate(pooled(a, b)).standard_errors.classical < estimate(a).standard_errors.classical).all()
 
 
 def pooled(a: Regression, b: Regression) -> Regression:
@@ -150,8 +150,9 @@ def test_a_sample_that_no_period_was_recorded_at_counts_for_nothing(estimate: Es
 @ESTIMATOR
 def test_the_same_data_give_the_same_bits(estimate: Estimator):
     one, other = estimate(problem(seed=3)), estimate(problem(seed=3))
-    for name in ("theta", "theta_std_classical", "theta_std", "correlated_lags"):
-        assert_array_equal(getattr(one, name), getattr(other, name))
+    assert_array_equal(one.theta, other.theta)
+    for a, b in zip(one.standard_errors, other.standard_errors, strict=True):
+        assert_array_equal(a, b)
 
 
 @ESTIMATOR

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.exports import renderer
 from davinci_forces.exports.identified import export_of
-from davinci_forces.filters import ekf, online
+from davinci_forces.filters import online, tracker
 from davinci_forces.filters.online import (
     BAD_INPUT,
     OK,
@@ -25,7 +25,7 @@ from davinci_forces.filters.online import (
 )
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.mechanics.kinematics import jacobian
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.records import Choice, Contact, FilterNoise, Fit, JointModel, Motion, Track
@@ -95,7 +95,7 @@ def test_samples_one_by_one_give_what_the_study_measures_of_a_stream(lab, catalo
     [tuned] = catalogue.select(FilterNoise, joint="hand_roll")
     noise = noise_model(tuned, lab.study.robot.joint("hand_roll"), 1 / model.rate, lab.study.settings.q_tau)
     [part] = filter_inputs(causal)
-    expected = ekf.track(part, noise).tau_ext
+    expected = tracker("ekf")(part, noise).tau_ext
     late = round(stream.delay * stream.rate)
     ours, later = np.array([e.tau_ext[0] for e in out])[late:], slice(500, len(q) - late)
     assert_allclose(ours[later], expected[later], atol=1e-3 * np.ptp(expected))

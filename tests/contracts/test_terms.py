@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.filters import stepping
 from davinci_forces.maths.models import terms
-from davinci_forces.maths.models.bias import bias as bias_of
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
 from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term
+from davinci_forces.maths.models.terms import bias as bias_of
 from davinci_forces.report.writers.typesetting import Formula, draw_formulas
 from davinci_forces.robots.robot import Kind
 from tests.contracts.dimensions import has_a_dimension, is_effort

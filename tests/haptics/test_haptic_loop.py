@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from davinci_forces.filters import ekf
+from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import FilterInput
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import THESIS_HAND, simulate_switching
@@ -50,7 +50,7 @@ def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
     joint = JointDynamics(np.full(len(q), SLIDE.inertia), haptic.coefficients(SLIDE), nothing)
     recorded = FilterInput(joint, q, dq, nothing, tau, 1.0 / scenario.rate, scenario.noise.tau)
     assert run.estimates.max() > 5.0
-    assert_array_equal(run.estimates, ekf.track(recorded, haptic.filter_noise(scenario)).tau_ext)
+    assert_array_equal(run.estimates, tracker("ekf")(recorded, haptic.filter_noise(scenario)).tau_ext)
 
 
 def test_the_harmonic_of_a_sine_is_its_amplitude():

@@ -10,15 +10,13 @@ from davinci_forces.filters import FILTERS, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.identification.observations import observe
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
-from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models import terms
-from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import deflection, efforts, friction_state, pieces
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Motion
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 
 DAHL = terms.presliding_friction(0.01)
 T_S = 0.005
@@ -150,7 +148,7 @@ def test_what_a_filter_is_told_of_a_coupled_arm_is_its_effort():
     model, motion = coupled(), wandering(3000)
     theta = truth(model)
     for i, told in enumerate(model.joint_dynamics(theta, motion)):
-        own = bias(told.coefficients, motion.q[:, i], motion.dq[:, i], 0.0)[0]
+        own = terms.bias(told.coefficients, motion.q[:, i], motion.dq[:, i], 0.0)[0]
         tau = told.inertia * motion.ddq[:, i] + own + told.known
         assert_allclose(tau, true_effort(motion)[:, i], rtol=1e-9, atol=1e-9)
         assert told.coefficients[4] == [1.0, 0.8][i]
@@ -215,7 +213,7 @@ def test_a_deflection_starts_anew_after_a_gap_and_is_known_after_a_few_displacem
         # Whatever the deflection was at the start, it is forgotten where it counts as known.
         other = [1.0]
         for dq in motion.dq[part, 0][:first]:
-            other.append(float(derivation.deflect(other[-1], dq, T_S, x_0)))
+            other.append(float(terms.deflect(other[-1], dq, T_S, x_0)))
         assert abs(other[-1] - z[start + first]) < 1.5 * np.exp(-3.0)
 
 
@@ -223,7 +221,7 @@ def test_a_deflection_of_a_period_ends_where_it_starts():
     motion = column(wandering(2000, periodic=True))
     z, known = deflection(motion, 0, 0.02)
     assert known.all()
-    after = derivation.deflect(z[-1], motion.dq[-1, 0], T_S, 0.02)
+    after = terms.deflect(z[-1], motion.dq[-1, 0], T_S, 0.02)
     assert after == pytest.approx(z[0], abs=1e-12)
 
 
@@ -247,7 +245,7 @@ def test_friction_that_reverses_gradually_has_no_effort_at_speed_so_coulomb_fric
     assert steady.sum() > 300
     assert_allclose(model.regressor(motion).Phi[steady, 0] @ theta, 0.8 * np.sign(dq[steady]), atol=5e-3)
     dynamics = model.joint_dynamics(theta, motion)[0]
-    assert dynamics.coefficients[derivation.COULOMB] == pytest.approx(0.3)  # that reverses at once
+    assert dynamics.coefficients[terms.COULOMB] == pytest.approx(0.3)  # that reverses at once
     effort = 0.3 * np.sign(dq) + dynamics.known
     assert_allclose(effort, model.regressor(motion).Phi[:, 0] @ theta, atol=1e-12)
 

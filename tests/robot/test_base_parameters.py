@@ -6,7 +6,7 @@ import pytest
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, base_parameters
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 
 PSM = dvrk_psm.PSM_CHAIN
 ARMS = pytest.mark.parametrize(("chain", "n"), [(CHAIN, 3), (CHAIN, 6), (CHAIN, 7), (PSM, 3), (PSM, 6)])

@@ -5,7 +5,7 @@ import pytest
 
 from davinci_forces.maths.mechanics import kinematics
 from davinci_forces.maths.mechanics.chain import FIXED, TableRow, denavit_hartenberg, modified_denavit_hartenberg
-from davinci_forces.robots.davinci_chain import CHAIN as DAVINCI
+from davinci_forces.robots.davinci import CHAIN as DAVINCI
 from davinci_forces.robots.dvrk_psm import PSM_CHAIN as PSM
 
 POSES = 100

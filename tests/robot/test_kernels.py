@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics import kernels, rigid_body
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 from tests.robot import lagrangian
 
 N = 3 * kernels.LANES + 1  # three full rows of samples, and one more
@@ -118,7 +118,7 @@ def test_an_arm_that_falls_freely_keeps_its_energy(n, least):
 BYTES = """
 import hashlib, numpy as np
 from davinci_forces.maths.mechanics import kernels, rigid_body
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 rigid_body.COMPILE_FROM = 1
 q, dq, ddq = np.random.default_rng(0).uniform(-3, 3, (3, 1001, 6))
 M, bias, J, arm = np.empty((6, 6)), np.empty(6), np.empty((3, 6)), rigid_body.moving_tree(CHAIN, BODIES, 6)

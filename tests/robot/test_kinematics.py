@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, tip_force
-from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import CHAIN
+from davinci_forces.robots.davinci import CHAIN, ROBOT
 from tests.robot import thesis_matrices as thesis
 
 LIMITS = np.array([joint.limits.q for joint in ROBOT.joints])

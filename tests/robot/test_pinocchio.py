@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, rigid_body
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.robots.davinci import BODIES, CHAIN
 from tests.robot.pinocchio_arm import tree
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed: a rival of benchmarks, not a dependency")

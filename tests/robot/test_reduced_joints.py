@@ -8,8 +8,7 @@ import pytest
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import denavit_hartenberg
 from davinci_forces.maths.models.physical import reduced_parameters
-from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
+from davinci_forces.robots.davinci import BODIES, CHAIN, DRIVES, GUESSED_LC5, ROBOT, in_table_frames
 
 # What the formulas are written in, and where it is in the bodies: link 3 is row 1 of the arrays.
 CENTRES = {3: (0, -1), 4: (0, -1), 5: (2, -1), 6: (2, -1), 7: (1, -1), 8: (0, -1), 9: (0, -1)}

@@ -11,8 +11,7 @@ from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
+from davinci_forces.robots.davinci import BODIES, CHAIN, DRIVES, ROBOT, in_table_frames
 from tests.robot import lagrangian
 from tests.robot import thesis_matrices as thesis
 

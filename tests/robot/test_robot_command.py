@@ -11,8 +11,8 @@ from davinci_forces.cli import errors_as_messages
 from davinci_forces.commands import robot
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
+from davinci_forces.robots.davinci import BODIES, CHAIN
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = [
     "frames", "tip", "remote_centre", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition",

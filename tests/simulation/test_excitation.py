@@ -18,9 +18,8 @@ from davinci_forces.maths.excitation.fourier import (
     ranges,
 )
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, shrink_into_limits
-from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.models.terms import TERMS, inertia, stiffness
+from davinci_forces.maths.models.terms import TERMS, bias, inertia, stiffness
 from davinci_forces.robots.davinci import ROBOT
 
 TABLE_6_1 = {  # with b1 of hand roll corrected; f as printed, and for hand roll as that correction gives it

@@ -1,7 +1,7 @@
 """Least squares with inertia and friction that are not negative."""
 
 from davinci_forces.estimators.problem import Estimate, Regression, standard_errors
-from davinci_forces.maths.estimation import least_squares
+from davinci_forces.maths.estimation.least_squares import solve_bounded
 
 NAME = "bounded least squares"
 
@@ -11,6 +11,5 @@ def estimate(problem: Regression) -> Estimate:
 
     The standard errors are those of least squares, which are too large for a parameter at its bound.
     """
-    weight, R = problem.weight, problem.triangle
-    theta = least_squares.solve_bounded(R, problem.known.signs(len(R.y)))
-    return Estimate(theta, lambda: standard_errors(problem, weight, R, theta))
+    theta = solve_bounded(problem.triangle, problem.known.signs(len(problem.names)))
+    return Estimate(theta, lambda: standard_errors(problem, theta))

@@ -19,6 +19,6 @@ def estimate(problem: Regression) -> Estimate:
 
     Raises NotIdentifiable if the conic program is not solved, or if least squares raise this error.
     """
-    weight, R = problem.weight, problem.triangle
+    R = problem.triangle
     theta = nearest(R, of_signs(problem.known.signs(len(R.y)))).theta
-    return Estimate(theta, lambda: standard_errors(problem, weight, R, R.theta))
+    return Estimate(theta, lambda: standard_errors(problem, R.theta))

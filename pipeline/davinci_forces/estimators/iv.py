@@ -20,8 +20,7 @@ def estimate(problem: Regression) -> Estimate:
 
     Raises NotIdentifiable if the instruments do not separate the parameters, or if least squares raise this error.
     """
-    weight, R = problem.weight, problem.triangle
-    root = np.sqrt(weight)[:, None]
+    R, root = problem.triangle, np.sqrt(problem.weight)[:, None]
     F = problem.Phi * root / R.scale
     parts = np.split(problem.Phi, problem.starts[1:])
     Z = np.concatenate([np.roll(part, LAG, axis=0) + np.roll(part, -LAG, axis=0) for part in parts])
@@ -32,4 +31,4 @@ def estimate(problem: Regression) -> Estimate:
         motion = f"the motion {LAG} samples before and after"
         raise NotIdentifiable(f"{motion} does not separate {alike}: condition number {condition:.1e}")
     theta = np.linalg.solve(ZF, Q.T @ (problem.tau * root[:, 0])) / R.scale
-    return Estimate(theta, lambda: standard_errors_by(problem, weight, theta, Q, np.linalg.inv(ZF) / R.scale[:, None]))
+    return Estimate(theta, lambda: standard_errors_by(problem, theta, Q, np.linalg.inv(ZF) / R.scale[:, None]))

@@ -10,5 +10,5 @@ def estimate(problem: Regression) -> Estimate:
 
     The standard errors scale with the residuals, so a model that does not fit has larger ones than noise.
     """
-    weight, R = problem.weight, problem.triangle
-    return Estimate(R.theta, lambda: standard_errors(problem, weight, R, R.theta))
+    theta = problem.triangle.theta
+    return Estimate(theta, lambda: standard_errors(problem, theta))

@@ -18,10 +18,10 @@ def estimate(problem: Regression) -> Estimate:
     likelihood of the data, with one variance of the parameters around theta_0 and one of the effort around Phi theta
     (MacKay, 1992).  The standard errors are those of least squares, without the information of the guess.
     """
-    weight, R = problem.weight, problem.triangle
+    R = problem.triangle
     guess = np.zeros(len(R.y)) if problem.known.guess is None else problem.known.guess
-    theta = fit_with_prior(R, guess, int(np.count_nonzero(weight)))
-    return Estimate(theta, lambda: standard_errors(problem, weight, R, theta))
+    theta = fit_with_prior(R, guess, int(np.count_nonzero(problem.weight)))
+    return Estimate(theta, lambda: standard_errors(problem, theta))
 
 
 def fit_with_prior(R: Triangle, guess: Array, K: int) -> Array:

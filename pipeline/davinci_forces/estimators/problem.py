@@ -49,15 +49,16 @@ class Regression:
     noise: Array | None = None  # (K,) noise like that of tau, without the motion; None: the residual is taken for it
     model_std: Array | float = 0.0  # (p,) standard errors of the parameters due to the model
     Phi_cov: Array | None = None  # (S, p, p) mean covariance of a row's errors in each log; None: not known
+    weights: Array | None = None  # (K,) of the samples; None: all periods have the same weight
 
     @cached_property
     def weight(self) -> Array:
-        """The weight of each sample (K,) if all periods have the same weight."""
-        return self.periods.astype(float)
+        """The weight of each sample (K,)."""
+        return self.periods.astype(float) if self.weights is None else self.weights
 
     @cached_property
     def triangle(self) -> Triangle:
-        """The QR factors of the samples if all periods have the same weight.  Raises the errors of `factorise`."""
+        """The QR factors of the weighted samples.  Raises the errors of `factorise`."""
         return factorise(self, self.weight)
 
 
@@ -67,7 +68,7 @@ class StandardErrors(NamedTuple):
     classical: Array  # (p,) standard errors for residuals that are uncorrelated and of equal variance
     noise: Array  # (p,) for noise that is correlated and of varying variance
     model: Array  # (p,)
-    lags: float  # the sum of the noise's correlations over all lags but 0
+    lags: float  # over which noise is correlated, each weighted by its correlation
 
     @property
     def total(self) -> Array:
@@ -90,11 +91,11 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters; standard errors and searches are computed at first use, because refits need neither."""
+    """Parameters; standard errors and searches are computed where they are used, because refits need neither."""
 
     theta: Array  # (p,)
     compute_standard_errors: Callable[[], StandardErrors]
-    run_searches: Callable[[], tuple[Search, ...]] = tuple
+    run_searches: Callable[[], tuple[Search, ...]] = tuple  # by every manner of search
 
     @cached_property
     def standard_errors(self) -> StandardErrors:
@@ -102,24 +103,9 @@ class Estimate:
         return self.compute_standard_errors()
 
     @property
-    def searches(self) -> tuple[Search, ...]:
-        """The searches for the parameters, by every manner of search."""
-        return self.run_searches()
-
-    @property
-    def theta_std_classical(self) -> Array:
-        """Standard errors (p,) for residuals that are uncorrelated and of equal variance."""
-        return self.standard_errors.classical
-
-    @property
     def theta_std(self) -> Array:
         """Standard errors (p,) of noise and model together."""
         return self.standard_errors.total
-
-    @property
-    def correlated_lags(self) -> int:
-        """The number of lags over which noise is correlated, each weighted by its correlation."""
-        return round(self.standard_errors.lags)
 
 
 Estimator = Callable[[Regression], Estimate]
@@ -153,28 +139,27 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
 
 
 def standard_errors_by(
-    problem: Regression, weight: Array, theta: Array, Q: Array, D: Array, residual: Array | None = None
+    problem: Regression, theta: Array, Q: Array, D: Array, residual: Array | None = None
 ) -> StandardErrors:
     """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p).
 
     The classical ones follow from the weighted residuals, or from a `residual` (K,) instead.  Those of noise follow
     from the noise of the problem, or from the same residuals if it is not known.
     """
-    root = np.sqrt(weight)
+    root = np.sqrt(problem.weight)
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
-    degrees = int((weight > 0).sum()) - len(theta)
+    degrees = int((problem.weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
     noise = residual if problem.noise is None else root * problem.noise
     variance, lags = correlated_variance(Q, noise, problem.starts, D, degrees)
     return StandardErrors(classical, np.sqrt(variance), np.full(len(theta), problem.model_std), lags)
 
 
-def standard_errors(
-    problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None
-) -> StandardErrors:
+def standard_errors(problem: Regression, theta: Array, residual: Array | None = None) -> StandardErrors:
     """Compute the standard errors of parameters of least squares, or close to them, as `standard_errors_by` does."""
+    R = problem.triangle
     inverse = np.linalg.inv(R.U)
     Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
-    Q *= np.sqrt(weight)[:, None]
-    return standard_errors_by(problem, weight, theta, Q, inverse / R.scale[:, None], residual)
+    Q *= np.sqrt(problem.weight)[:, None]
+    return standard_errors_by(problem, theta, Q, inverse / R.scale[:, None], residual)

@@ -34,16 +34,16 @@ def estimate(problem: Regression) -> Estimate:
 
     Raises NotIdentifiable if the noise of the columns is not known or too large, or if least squares raise this error.
     """
-    weight, R = problem.weight, problem.triangle
+    R = problem.triangle
     if problem.Phi_cov is None:
         raise NotIdentifiable("the noise of the motion is not known without repeated periods: record at least two")
-    counts = np.add.reduceat(weight, problem.starts)
+    counts = np.add.reduceat(problem.weight, problem.starts)
     C = np.einsum("s,spq->pq", counts, problem.Phi_cov) / np.outer(R.scale, R.scale)
     if not C.any():
-        return Estimate(R.theta, lambda: standard_errors(problem, weight, R, np.zeros_like(C), R.theta))
+        return Estimate(R.theta, lambda: standard_errors(problem, np.zeros_like(C), R.theta))
     refuse_noisy(problem, R, C)
-    scaled = fit_scaled(R, C, float(problem.tau_var @ (weight > 0)))
-    return Estimate(scaled / R.scale, lambda: standard_errors(problem, weight, R, C, scaled / R.scale))
+    scaled = fit_scaled(R, C, float(problem.tau_var @ (problem.weight > 0)))
+    return Estimate(scaled / R.scale, lambda: standard_errors(problem, C, scaled / R.scale))
 
 
 def refuse_noisy(problem: Regression, R: Triangle, C: Array) -> None:
@@ -91,8 +91,9 @@ def fit_for_noise(R: Triangle, axes: Array, variance: Array, v: float) -> Array:
     return np.asarray(axes @ np.r_[exact, z])
 
 
-def standard_errors(problem: Regression, weight: Array, R: Triangle, C: Array, theta: Array) -> StandardErrors:
+def standard_errors(problem: Regression, C: Array, theta: Array) -> StandardErrors:
     """Compute the standard errors with G = Phi' Phi - C in place of Phi' Phi."""
-    Q = problem.Phi * np.sqrt(weight)[:, None] @ (np.linalg.inv(R.U) / R.scale[:, None])
+    R = problem.triangle
+    Q = problem.Phi * np.sqrt(problem.weight)[:, None] @ (np.linalg.inv(R.U) / R.scale[:, None])
     D = np.linalg.solve(R.U.T @ R.U - C, R.U.T) / R.scale[:, None]
-    return standard_errors_by(problem, weight, theta, Q, D)
+    return standard_errors_by(problem, theta, Q, D)

@@ -1,10 +1,12 @@
 """Weighted least squares: samples at which the periods differ more have less weight."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators.problem import Estimate, Regression, factorise, standard_errors
+from davinci_forces.estimators.problem import Estimate, Regression, standard_errors
 from davinci_forces.maths.arrays import Array
 
 NAME = "weighted least squares"
@@ -31,12 +33,12 @@ def estimate(problem: Regression) -> Estimate:
         raise NotIdentifiable(f"weights need at least {MIN_PERIODS} periods in every log, and one holds {fewest}")
     parts = (np.split(column, problem.starts[1:]) for column in (problem.tau_var, problem.periods))
     weight = np.concatenate([M / pool_variance(var, M) for var, M in zip(*parts, strict=True)])
-    R = factorise(problem, weight)
-    degrees = int(np.count_nonzero(problem.periods)) - len(R.y)
+    weighted = replace(problem, weights=weight)
+    R, degrees = weighted.triangle, int(np.count_nonzero(problem.periods)) - len(problem.names)
     if R.min_squares > degrees * (1.0 + max(MIN_EXCESS_SHARE, MIN_EXCESS_Z * np.sqrt(2.0 / degrees))):
-        weight = add_model_error(weight, problem.tau - problem.Phi @ R.theta, degrees)
-        R = factorise(problem, weight)
-    return Estimate(R.theta, lambda: standard_errors(problem, weight, R, R.theta))
+        weighted = replace(problem, weights=add_model_error(weight, problem.tau - problem.Phi @ R.theta, degrees))
+    theta = weighted.triangle.theta
+    return Estimate(theta, lambda: standard_errors(weighted, theta))
 
 
 def add_model_error(weight: Array, residual: Array, degrees: int) -> Array:

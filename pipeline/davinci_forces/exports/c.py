@@ -9,8 +9,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.exports.identified import Export, Rendering
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
-from davinci_forces.maths.models.bias import COEFFICIENTS
-from davinci_forces.maths.models.terms import Z_OF_MOTION
+from davinci_forces.maths.models.terms import COEFFICIENTS, Z_OF_MOTION
 
 KINDS = ("", "deflection", "smooth sign", "Stribeck", *Z_OF_MOTION)  # of z, in the order of `state` in model.c
 NO_BAND = {"edges": [inf] * 3, "factor": [1.0] * 4, "model_variance": 0.0}

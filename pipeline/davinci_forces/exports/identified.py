@@ -13,7 +13,7 @@ from davinci_forces.filters import DEFAULT
 from davinci_forces.filters.error_bands import free_errors
 from davinci_forces.filters.response import noise_model
 from davinci_forces.filters.stepping import covariances
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.contact.detection import alarm_level
 from davinci_forces.maths.mechanics.bodies import PARAMETERS

@@ -12,8 +12,7 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, Rendering, terms_of
-from davinci_forces.identification.joint_models import LogModels
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.estimation.conic import LENGTH, complete

@@ -1,20 +1,13 @@
 """Filters that track the external effort: one module each, exporting `blocks` and `NAME`."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import (
-    Block,
-    BlockFilter,
-    Filter,
-    NoiseModel,
-    Recording,
-    Tracked,
-    join_blocks,
-    whole,
-)
+from davinci_forces.filters.problem import Block, Filter, NoiseModel, Recording, Tracked, join_blocks
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
@@ -22,19 +15,20 @@ DEFAULT = "ekf"  # the other filters are compared with this one
 MAX_NIS_RATIO = 50.0  # of the mean normalised innovation squared to 2, the mean of a consistent filter
 
 
+@cache
+def _filter(name: str) -> Any:
+    return import_module(f"davinci_forces.filters.{name}")
+
+
+@cache
 def tracker(name: str) -> Filter:
-    """Return the filter of that name, over a recording in memory."""
-    return whole(_blocks(name))
-
-
-def _blocks(name: str) -> BlockFilter:
-    blocks: BlockFilter = import_module(f"davinci_forces.filters.{name}").blocks
-    return blocks
+    """Return the filter of that name, as a function of one recording and its noise."""
+    return lambda recording, noise: filter_parts(name, [recording], noise)
 
 
 def title(name: str) -> str:
     """Return the title of a filter in reports."""
-    return str(import_module(f"davinci_forces.filters.{name}").NAME)
+    return str(_filter(name).NAME)
 
 
 def filter_parts(
@@ -49,9 +43,9 @@ def filter_parts(
 
 def filter_blocks(name: str, parts: Sequence[Recording], noise: NoiseModel) -> Iterator[Block]:
     """Yield the blocks of a filter's pass over the parts of a recording."""
-    blocks, start = _blocks(name), 0
+    start = 0
     for part in parts:
-        for rows, tracked in blocks(part, noise):
+        for rows, tracked in _filter(name).blocks(part, noise):
             yield slice(start + rows.start, start + rows.stop), tracked
         start += part.samples
 

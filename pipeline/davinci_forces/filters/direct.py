@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, input_blocks
-from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.terms import bias
 
 NAME = "Measured minus model"
 

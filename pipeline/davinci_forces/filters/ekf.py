@@ -1,7 +1,4 @@
-"""The extended Kalman filter of one joint, with the external effort as a state, with steps of second order.
-
-    f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
-    x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
+"""The extended Kalman filter of one joint, with the external effort as a state, with the second-order step of `sample`.
 
 Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the acceleration.  This term exceeds an
 encoder's noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.
@@ -12,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.filters.sample import Belief
 from davinci_forces.filters.stepping import STORED, arguments, correct, covariances, predict, run, transition
 from davinci_forces.maths.compiled import compile_and_store
-from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.terms import Coefficients
 from davinci_forces.maths.signals.windows import TRANSIENT
 
 NAME = "Extended Kalman filter"
@@ -30,9 +27,6 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         before, *others = arguments(part, noise)
         s, _ = run(out, np.empty((0, STORED)), part.samples, s or before, *others)
         yield rows, Tracked(*out)
-
-
-track = whole(blocks)
 
 
 def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
@@ -50,7 +44,7 @@ def step(
     """Filter one sample as it arrives: return the corrected state, and its prediction for the next sample.
 
     `s` is the last prediction, or `sample.first`; `y` are position and velocity; `drive` is the effort less the known
-    effort of other joints.  The results equal those of `track` exactly for the same drive and inertia M.
+    effort of other joints.  The results equal those of `blocks` exactly for the same drive and inertia M.
     """
     corrected, predicted = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))
     return corrected, predicted

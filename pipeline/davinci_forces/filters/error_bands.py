@@ -1,7 +1,5 @@
 """The variance of a log's smoothed external effort, calibrated on free motion of other logs."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
@@ -12,17 +10,12 @@ from davinci_forces.records.prediction import ANOTHER_PATH
 OTHER_BLOCKS = "its own other blocks"  # the source if there is no other log
 
 
-class TotalVariance(NamedTuple):
-    """The variance (N,) of a smoothed external effort, its standard error (N,), and their source."""
+def total_variance(
+    band: ErrorBand, log: str, path: str, dq: Array, own: Array, is_centred: bool
+) -> tuple[Array, Array, str]:
+    """Compute the variance (N,) of a log's smoothed effort from the smoother's own deviation and velocity (N,).
 
-    variance: Array
-    std: Array
-    source: str  # logs, or blocks of this log
-
-
-def total_variance(band: ErrorBand, log: str, path: str, dq: Array, own: Array, is_centred: bool) -> TotalVariance:
-    """Compute the variance of a log's smoothed external effort from the smoother's own deviation and velocity (N,).
-
+    Its standard error (N,) and its source, logs or blocks of this log, are returned, too.
     The errors are those of other logs on a path of the same kind, because on a fitted path a model's error repeats.
     Without such logs, the larger errors on another path are used.  If there is no other log, the variance of a block is
     that of the other blocks.  `is_centred` is for efforts whose day offset was subtracted.
@@ -34,14 +27,14 @@ def total_variance(band: ErrorBand, log: str, path: str, dq: Array, own: Array, 
             calibration = calibrate(errors.select(which))
             variance = calibration.variance(own, dq)
             std = 2.0 * calibration.relative_std * variance
-            return TotalVariance(variance, std, ", ".join(dict.fromkeys(source[which])))
+            return variance, std, ", ".join(dict.fromkeys(source[which]))
     variance, std = own**2, np.zeros(len(dq))
     for number, part in enumerate(np.array_split(np.arange(len(dq)), LOG_BLOCKS)):
         if (band.block != number).any():
             calibration = calibrate(errors.select(band.block != number))
             variance[part] = calibration.variance(own[part], dq[part])
             std[part] = 2.0 * calibration.relative_std * variance[part]
-    return TotalVariance(variance, std, OTHER_BLOCKS)
+    return variance, std, OTHER_BLOCKS
 
 
 def free_errors(band: ErrorBand, is_centred: bool) -> FreeErrors:

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, block_rows, column
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import bias
+from davinci_forces.filters.problem import Block, NoiseModel, Recording, Tracked, column
+from davinci_forces.maths.arrays import Array, row_blocks
+from davinci_forces.maths.models.terms import bias
 
 NAME = "Momentum observer"
 
@@ -24,7 +24,7 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
 
     N, T_s, state = recording.samples, recording.T_s, np.zeros(0)
     K, decay = gain(float(np.mean(column(recording, lambda part: part.joint.inertia))), T_s, noise)
-    for rows in block_rows(recording):
+    for rows in row_blocks(N):
         first = max(rows.start - 1, 0)
         beside = recording.part(slice(first, min(rows.stop + 1, N))).joint.inertia  # neighbours give its derivative
         joint, q, dq, _, tau, _, initial_std = recording.part(rows)

@@ -85,11 +85,8 @@ class LinkTree:
         self.placement = [np.array(link["placement"], float)[:3] for link in links]
         self.gravity = gravity * np.array(chain["up"], float)
         self.tip: tuple[int, Array] | None = None
-        if chain.get("tip"):
-            self.tip = (
-                0 if chain["tip"]["link"] is None else chain["tip"]["link"] + 1,
-                np.array(chain["tip"]["position"]),
-            )
+        if tip := chain.get("tip"):
+            self.tip = 0 if tip["link"] is None else tip["link"] + 1, np.array(tip["position"])
 
     def poses(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Rotations (B, 3, 3) and positions (B, 3) of the links in the frames of their parents, at q (B, n)."""
@@ -289,9 +286,8 @@ def _term(p: Mapping[str, Any]) -> TermValue:
     state = p["state"] or {"kind": ""}
     kind = state["function"] if state["kind"] == "function" else state["kind"]
     scale = next((value for key, value in state.items() if key not in ("kind", "function")), 0.0)
-    return TermValue(
-        p["value"], p["acceleration"], tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS), kind, scale
-    )
+    c = tuple(float(p["functions"].get(f, 0.0)) for f in FUNCTIONS)
+    return TermValue(p["value"], p["acceleration"], c, kind, scale)
 
 
 def _state(term: TermValue, memory: float, q: float, dq: float) -> float:
@@ -402,10 +398,8 @@ class Stream:
         if not joint.coupled:
             return 0.0, 0.0
         unit, still = np.eye(len(q))[joint.row], np.zeros_like(q)
-        motions = [np.stack(pair) for pair in ((q, q), (dq, still), (ddq, unit))]
-        tau, M = self.links.efforts(joint.bodies, motions[0], motions[1], motions[2], np.array([1.0, 0.0]))[
-            :, joint.row
-        ]
+        q, dq, ddq = (np.stack(pair) for pair in ((q, q), (dq, still), (ddq, unit)))
+        tau, M = self.links.efforts(joint.bodies, q, dq, ddq, np.array([1.0, 0.0]))[:, joint.row]
         return float(tau), float(M)
 
     def _force(self, q: Array, tau_ext: Array) -> Array:

@@ -1,14 +1,14 @@
 """The input and the output of every filter."""
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, row_blocks
-from davinci_forces.maths.models.bias import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.models.terms import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import JointModel
 
@@ -53,13 +53,7 @@ Recording = FilterInput | LongInput
 
 def input_blocks(recording: Recording) -> Iterator[tuple[slice, FilterInput]]:
     """Yield the samples of a recording in blocks."""
-    return ((rows, recording.part(rows)) for rows in block_rows(recording))
-
-
-def block_rows(recording: Recording) -> list[slice]:
-    """Return the samples of each block of a recording; what is in memory is one block."""
-    N = recording.samples
-    return [slice(0, N)] if isinstance(recording, FilterInput) else row_blocks(N)
+    return ((rows, recording.part(rows)) for rows in row_blocks(recording.samples))
 
 
 def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
@@ -102,9 +96,8 @@ class Tracked(NamedTuple):
     nis: Array
 
 
-Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
+Filter = Callable[[Recording, NoiseModel], Tracked]
 Block = tuple[slice, Tracked]  # some samples of a recording, and what a filter made of them
-BlockFilter = Callable[[Recording, NoiseModel], Iterator[Block]]  # blocks(recording, noise), in any order
 
 
 def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked._fields) -> Tracked:
@@ -114,17 +107,6 @@ def join_blocks(blocks: Iterable[Block], N: int, names: Iterable[str] = Tracked.
         for name, column in columns.items():
             column[rows] = getattr(tracked, name)
     return Tracked(**{name: columns.get(name, np.empty(0)) for name in Tracked._fields})
-
-
-@cache
-def whole(blocks: BlockFilter) -> Filter:
-    """Return the filter of a recording in memory, from one that filters it block by block."""
-
-    def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-        [(_, tracked)] = blocks(recording, noise)
-        return tracked
-
-    return track
 
 
 def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool = False) -> list[Recording]:
@@ -142,9 +124,8 @@ def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool 
         part = model.part(which)
         known = part.tau_known if tau_hat is None else part.tau_known + (tau_hat[which] - part.tau_hat)
         q, dq = (part.q, part.dq) if smooth else (part.q_measured, part.dq_measured)
-        return FilterInput(
-            JointDynamics(part.inertia, coefficients, known), q, dq, part.ddq, part.tau, T_s, initial_std
-        )
+        dynamics = JointDynamics(part.inertia, coefficients, known)
+        return FilterInput(dynamics, q, dq, part.ddq, part.tau, T_s, initial_std)
 
     inputs = [LongInput(s.stop - s.start, T_s, initial_std, partial(read, s.start)) for s in segments(model.segment)]
     return [long.part(slice(0, long.samples)) if long.samples <= BLOCK_SAMPLES else long for long in inputs]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, ekf, filter_parts, tracker
+from davinci_forces.filters import DEFAULT, filter_parts, tracker
 from davinci_forces.filters.problem import (
     Filter,
     FilterInput,
@@ -24,7 +24,7 @@ from davinci_forces.filters.problem import (
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.contact.detection import STEP_WIDTH, TIP_REACH
-from davinci_forces.maths.models.bias import VISCOUS
+from davinci_forces.maths.models.terms import VISCOUS
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
 
@@ -106,7 +106,7 @@ def steady_std(inertia: float, viscous: float, T_s: float, noise: NoiseModel) ->
     """Compute the standard deviation of the external effort on a joint at rest, once the filter has converged."""
     still = np.zeros(round(BEFORE / T_s) + 1)
     at_rest = stationary_joint(np.full(len(still), inertia), viscous, still, T_s, initial_std=1.0)
-    return float(ekf.track(at_rest, noise).tau_ext_std[-1])
+    return float(tracker(DEFAULT)(at_rest, noise).tau_ext_std[-1])
 
 
 def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name: str = DEFAULT) -> NoiseModel:

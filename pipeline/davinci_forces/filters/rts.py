@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks, whole
+from davinci_forces.filters.problem import Block, FilterInput, NoiseModel, Recording, Tracked, input_blocks
 from davinci_forces.filters.stepping import STORED, arguments, gains, run
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
@@ -36,9 +36,6 @@ def blocks(recording: Recording, noise: NoiseModel) -> Iterator[Block]:
         is_last = rows.stop == recording.samples
         _backwards(stored, noise.r_q**2, noise.r_dq**2, is_last, after, *out, *innovations[:2])
         yield rows, Tracked(*out, *innovations)
-
-
-track = whole(blocks)
 
 
 def forwards(recording: Recording, noise: NoiseModel) -> Iterator[tuple[slice, Any, Array, Array]]:

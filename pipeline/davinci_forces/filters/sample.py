@@ -26,7 +26,7 @@ INITIAL_VARIANCE_RATIO = 1e6
 
 
 def bias(c: Any, q: float, dq: float, z: float) -> Any:
-    """b and its derivatives by q and dq, as in `maths.models.bias`, with the sine of the system's C library."""
+    """b and its derivatives by q and dq, as in `maths.models.terms`, with the sine of the system's C library."""
     sine, cosine = math.sin(q), math.cos(q)
     b = c[0] + c[1] * sine + c[2] * cosine + c[3] * q + c[4] * dq + c[5] * sign(dq) + c[6] * z
     return b, c[1] * cosine - c[2] * sine + c[3], c[4]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from davinci_forces.filters import ekf
+from davinci_forces.filters import DEFAULT, ekf, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.maths.arrays import Array
@@ -35,7 +35,7 @@ def tune_noise(
     noise, center = start, np.log([start.r_q, start.r_dq, start.q_dq])
     change = np.zeros(len(center))
     for _ in range(ROUNDS):
-        noise = noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay))
+        noise = noise._replace(q_tau=smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay))
         walk = noise.q_tau
 
         def cost(change: Array, walk: float = walk) -> float:
@@ -49,7 +49,7 @@ def tune_noise(
             cost, change, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
         ).x
         noise = noise_of(center + change, walk)
-    return noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay))
+    return noise._replace(q_tau=smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay))
 
 
 def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:

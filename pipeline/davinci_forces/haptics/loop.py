@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import ekf, sample
+from davinci_forces.filters import ekf, sample, tracker
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
@@ -19,7 +19,7 @@ from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array, records
 from davinci_forces.maths.constants import PUSH_DELAY
-from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.terms import Coefficients
 from davinci_forces.maths.simulation.actuators import Loops
 from davinci_forces.maths.simulation.step import Friction, at_rest
 from davinci_forces.maths.simulation.surroundings import Path
@@ -53,13 +53,9 @@ class FeltResponse(NamedTuple):
 
 
 def complete_scenario(
-    scenario: HapticScenario,
-    body: Body = SLIDE,
-    noise: AxisNoise = SLIDE_NOISE,
-    stiffness: float = THESIS_TISSUE,
-    q_tau: float = 0.0,
-    delay: float = PUSH_DELAY,
-) -> HapticScenario:
+    scenario: HapticScenario, body: Body = SLIDE, noise: AxisNoise = SLIDE_NOISE, stiffness: float = THESIS_TISSUE,
+    q_tau: float = 0.0, delay: float = PUSH_DELAY,
+) -> HapticScenario:  # fmt: skip
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
     body = scenario.body or body
     return replace(
@@ -120,13 +116,9 @@ def felt_share(scenario: HapticScenario, frequency: float) -> complex:
 def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, x_0: float, path: Array = NO_PATH) -> LoopRun:
     """Simulate the loop once."""
     stiffness, _ = _parts(scenario)
-    clocks = Clocks(
-        scenario.tick,
-        round(1.0 / scenario.rate / scenario.tick),
-        round(1.0 / scenario.link_rate / scenario.tick),
-        math.ceil(scenario.position_delay / scenario.tick - 1e-9),
-        math.ceil(scenario.force_delay / scenario.tick - 1e-9),
-    )
+    periods = [round(1.0 / rate / scenario.tick) for rate in (scenario.rate, scenario.link_rate)]
+    delays = [math.ceil(x / scenario.tick - 1e-9) for x in (scenario.position_delay, scenario.force_delay)]
+    clocks = Clocks(scenario.tick, *periods, *delays)
     tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
     grip = Grip(*zero_order_hold(hand, scenario.tick), path)
     estimate = filter_in_loop(scenario) if scenario.filtered else lambda reading: reading.force  # sensor at the tip
@@ -185,7 +177,7 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     _, noise = _parts(scenario)
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
-    walk = model.q_tau or smallest_q_tau(ekf.track, body.inertia, body.viscous, T_s, model, scenario.filter_delay)
+    walk = model.q_tau or smallest_q_tau(tracker("ekf"), body.inertia, body.viscous, T_s, model, scenario.filter_delay)
     return model._replace(q_tau=walk)
 
 

@@ -105,10 +105,7 @@ class HapticScenario:
 def read(file: Path) -> HapticScenario:
     """Read a scenario.
 
-    Raises
-    ------
-    BadHaptics
-        If the file has problems; the message lists each with its line.
+    Raises BadHaptics if the file has problems; the message lists each with its line.
     """
     table = toml.read(file, BadHaptics)
     scenario = scenario_of(table)
@@ -154,8 +151,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     if scenario.friction >= 1.0:
         problem = f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls"
         tissue.problem(problem, "friction")
-    for part in (device, link, arm, loop_filter, tissue, table):
-        part.close()
+    table.close_all()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:
         message = 'an arm that follows exactly has no effort to estimate a force from; write use = "none" in [filter]'
@@ -172,7 +168,6 @@ def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
             entry.problem(f"name must match [a-z0-9_-]+, not {name!r}", "name")
         values = (entry.number(key, above=0.0) for key in ("mass", "damping", "stiffness"))
         hands.append((name, Hand(*values)))
-        entry.close()
     table.unique("hand", "name", enumerate(name for name, _ in hands), "two hands have the name")
     return tuple(hands)
 
@@ -187,12 +182,9 @@ def _delay(table: TomlTable, key: str) -> float:
 def _joint_arrays(table: TomlTable, default: Motors | Cascade) -> list[np.ndarray]:
     """Read the numbers of one joint; numbers of a motor must be positive, except the encoder step."""
     positive = isinstance(default, Motors)
-    columns = []
-    for key, value in zip(type(default)._fields, default, strict=True):
-        above = 0.0 if positive and key != "encoder_step" else -math.inf
-        columns.append(np.array([table.number(key, float(value[0]), low=0.0, above=above)]))
-    table.close()
-    return columns
+    least = {key: 0.0 if positive and key != "encoder_step" else -math.inf for key in default._fields}
+    defaults = default._asdict().items()
+    return [np.array([table.number(key, float(x[0]), low=0.0, above=least[key])]) for key, x in defaults]
 
 
 def read_stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, float]:
@@ -204,9 +196,7 @@ def read_stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, f
 
 
 def _body(table: TomlTable) -> Body:
-    body = Body(table.number("inertia", above=0.0), table.number("gravity", 0.0), *read_friction(table))
-    table.close()
-    return body
+    return Body(table.number("inertia", above=0.0), table.number("gravity", 0.0), *read_friction(table))
 
 
 def read_friction(table: TomlTable) -> tuple[float, Pair, Pair, float, float, float]:
@@ -219,18 +209,14 @@ def read_friction(table: TomlTable) -> tuple[float, Pair, Pair, float, float, fl
     bristles = table.number("bristle_stiffness", 0.0, low=0.0)
     if bristles > 0.0 and min(coulomb) <= 0.0:
         table.problem("bristles need Coulomb friction greater than 0", "coulomb")
-    velocity, damping = (
-        table.number("stribeck_velocity", 0.01, above=0.0),
-        table.number("bristle_damping", 0.0, low=0.0),
-    )
+    velocity = table.number("stribeck_velocity", 0.01, above=0.0)
+    damping = table.number("bristle_damping", 0.0, low=0.0)
     (up, down), (static_up, static_down) = coulomb, static
     return table.number("viscous", low=0.0), (up, down), (static_up, static_down), velocity, bristles, damping
 
 
 def _noise(table: TomlTable) -> AxisNoise:
-    noise = AxisNoise(*(table.number(key, above=0.0) for key in AxisNoise._fields))
-    table.close()
-    return noise
+    return AxisNoise(*(table.number(key, above=0.0) for key in AxisNoise._fields))
 
 
 def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:

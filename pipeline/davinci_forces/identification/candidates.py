@@ -40,10 +40,7 @@ class Library:
     @cached_property
     def inertias(self) -> Array:
         """The columns (S, m, m, p) of M = inertias theta at some poses along the trajectories."""
-        steps = [max(1, len(log.block) // POSES) for log in self.logs]
-        poses = [
-            np.stack([r.q[::step] for r in log.records], axis=1) for log, step in zip(self.logs, steps, strict=True)
-        ]
+        poses = [np.stack([r.q[:: max(1, len(log.block) // POSES)] for r in log.records], axis=1) for log in self.logs]
         return self.model.inertia_columns(np.concatenate(poses))
 
     @property

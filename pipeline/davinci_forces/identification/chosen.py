@@ -1,7 +1,7 @@
 """The choice among candidate models, and the parameters of the fitted candidates."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -36,19 +36,14 @@ class Selection:
 
     candidates: tuple[Candidate, ...]
     physical: tuple[bool, ...]
-    score: Array
-    score_std: Array
-    training: Array
-    training_std: Array
-    over_periods: Array  # scores with periods left out; NaN if no path repeats
-    over_periods_std: Array
+    scores: dict[str, Array]  # `score`, `training`, and `over_periods` with periods left out, NaN if no path repeats
     chosen: Candidate
     best: Candidate
     why: str
 
     def score_of(self, candidate: Candidate) -> float:
         """Return the error of one of the candidates."""
-        return float(self.score[[c.name for c in self.candidates].index(candidate.name)])
+        return float(self.scores["score"][[c.name for c in self.candidates].index(candidate.name)])
 
 
 class BlockEstimate(NamedTuple):
@@ -82,12 +77,14 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     return Selection(
         candidates=tuple(models),
         physical=tuple(physical),
-        score=np.array([result.score for result in results]),
-        score_std=np.array([standard_error(result) for result in results]),
-        training=np.array([result.fit.score for result in results]),
-        training_std=np.array([standard_error(result.fit) for result in results]),
-        over_periods=repeated[:, 0],
-        over_periods_std=repeated[:, 1],
+        scores={
+            "score": np.array([result.score for result in results]),
+            "score_std": np.array([standard_error(result) for result in results]),
+            "training": np.array([result.fit.score for result in results]),
+            "training_std": np.array([standard_error(result.fit) for result in results]),
+            "over_periods": repeated[:, 0],
+            "over_periods_std": repeated[:, 1],
+        },
         chosen=models[chosen],
         best=models[best],
         why=reason(models, results, [c.size for c in models], chosen, best),
@@ -98,17 +95,12 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
     """Return the selection whose chosen candidate errs less, named `chosen`, with the candidates of both."""
     both = [fixed, *([searched] if searched else [])]
     winner = min(both, key=lambda selection: selection.score_of(selection.chosen))
-    columns = {
-        name: np.concatenate([getattr(selection, name) for selection in both])
-        for name in ("score", "score_std", "training", "training_std", "over_periods", "over_periods_std")
-    }
-    return Selection(
+    return replace(
+        winner,
         candidates=tuple(c for selection in both for c in selection.candidates),
         physical=tuple(x for selection in both for x in selection.physical),
+        scores={name: np.concatenate([selection.scores[name] for selection in both]) for name in fixed.scores},
         chosen=winner.chosen._replace(variant=CHOSEN),
-        best=winner.best,
-        why=winner.why,
-        **columns,
     )
 
 
@@ -158,19 +150,17 @@ def parameters(
         errors = total.errors(theta)[0]
         noise = std_over_periods(part, count)
         model = model_std(part, theta, noise, others, count)
-        yield (
-            part,
-            BlockEstimate(
-                theta=theta,
-                theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
-                theta_std_noise=noise,
-                theta_std_model=model,
-                theta_std=np.hypot(noise, model),
-                samples=int(samples.max()),
-                condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
-                **scores(part, theta),
-            ),
+        estimate = BlockEstimate(
+            theta=theta,
+            theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
+            theta_std_noise=noise,
+            theta_std_model=model,
+            theta_std=np.hypot(noise, model),
+            samples=int(samples.max()),
+            condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
+            **scores(part, theta),
         )
+        yield part, estimate
 
 
 def scores(part: CandidatePart, theta: Array) -> dict[str, float]:

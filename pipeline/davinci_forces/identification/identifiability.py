@@ -52,9 +52,8 @@ def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]
 
 def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
     """Recommend what to record next; "" without problems."""
-    return (
-        f"{excite_command(robot, joint.name)} designs a motion that excites these parameters best" if problems else ""
-    )
+    command = excite_command(robot, joint.name)
+    return f"{command} designs a motion that excites these parameters best" if problems else ""
 
 
 def excite_command(robot: Robot, joint: str) -> str:

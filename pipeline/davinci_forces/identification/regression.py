@@ -10,7 +10,7 @@ from davinci_forces.estimators.problem import NO_PRIOR, ROWS, Prior, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.maths.models.physical import ROUNDING, Box, physical_lumping
+from davinci_forces.maths.models.physical import ROUNDING, Box
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.smoothing import measured_motion
 from davinci_forces.maths.signals.standstill import is_standing_still
@@ -96,12 +96,9 @@ def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
 def known_of(joint: Joint) -> Prior:
     """Return the signs that physics requires, and the box of physical parameters with a guess if the robot has one."""
     positive = np.array([term.positive for term in joint.terms])
-    if joint.physical is None or joint.effort:  # a current does not determine its motor's effort
-        return Prior(positive)
-    lumped = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    if lumped is None:
+    if joint.physical is None or joint.dependence is None or joint.effort:  # a current does not determine an effort
         return Prior(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
-    theta = lumped.theta(guess)
+    theta = joint.dependence.theta(guess)
     # A difference of masses that is only rounding is no guess, because a guess is trusted to all its digits.
-    return Prior(positive, Box(lower, upper, lumped), np.where(np.abs(theta) > ROUNDING, theta, 0.0))
+    return Prior(positive, Box(lower, upper, joint.dependence), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

@@ -60,7 +60,7 @@ class Scorer:
         self.spread = float(np.linalg.norm(tau - tau.mean())) or 1.0
         self.passed = share_passed(motion.rate, lowpass)
 
-    def score(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
+    def score(self, model: str, name: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
         """Return a prediction (N,) with its scores."""
         error = self.motion.tau - tau_hat
         slow = self._smoothed(error)
@@ -83,8 +83,8 @@ class Scorer:
             "relative_error_1111": root_mean_square(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL]),
         }
         return Prediction(
-            log=self.motion.log, joint=self.motion.joint, model=model, estimator=name, role=role, scheme=scheme,
-            path=path, t=self.motion.t, tau=self.motion.tau, tau_hat=tau_hat,
+            log=self.motion.log, joint=self.motion.joint, model=model, estimator=name, role=self.motion.role,
+            scheme=scheme, path=path, t=self.motion.t, tau=self.motion.tau, tau_hat=tau_hat,
             **{score: value for score, (value, _) in scores.items()},
             **{f"{score}_std": std for score, (_, std) in scores.items()},
         )  # fmt: skip

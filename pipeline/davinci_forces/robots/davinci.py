@@ -1,23 +1,140 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide.
 
+Tables 3.1, 4.1 and 4.2 are data here: z0 points up, the hand rolls about +y0, and at q = 0 the tool points along -z0.
 The thesis prints its excitation trajectories, the parameters of its joints, and the control studies of chapter 5.
 Misprints are listed with the parameters.
+
+The joints have 12, 21 and 7 physical parameters.  The tables give their initial guesses, from which the thesis computed
+the guesses in Tables 6.4-6.6.  The thesis does not print the bounds of its search.  The bounds here, one range for each
+kind of parameter, contain all values that such a link or motor could have.
 """
 
+import re
 from dataclasses import replace
 from math import pi
 
+import numpy as np
+
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives, cylinder
+from davinci_forces.maths.mechanics.chain import TableRow, denavit_hartenberg
+from davinci_forces.maths.models.physical import Physical, PhysicalTable, Quality
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST_COORDINATES
 from davinci_forces.robots.robot import ControlStudy, Joint, Kind, Limits, PrintedColumn, Robot
+
+# Table 3.1: name, parent frame, alpha [rad], a [m], d [m], theta [rad], coordinate (index in q).
+CHAIN = denavit_hartenberg(
+    [
+        TableRow("1", "0", -pi / 2, 0.0, 0.161, 0.0),  # base
+        TableRow("2", "1", -pi / 2, 0.0, -0.035, -pi / 2, 0),  # pivot plate
+        TableRow("3", "2", pi, 0.190, 0.0, 0.03, 1),  # parallelogram base
+        TableRow("4", "3", pi, 0.515, 0.0, 0.03 + pi / 2, 1),  # parallelogram upper bar
+        TableRow("5", "4", pi / 2, 0.040, 0.0, 0.0, 1),  # instrument holder
+        TableRow("6", "5", 0.0, 0.0, 0.282, 0.0, 2, slides=True),  # needle driver house
+        TableRow("7", "6", pi / 2, 0.0, 0.0, 0.0, 3),  # needle driver neck
+        TableRow("8", "7", pi / 2, 0.009, 0.0, pi / 2, 4),  # needle driver head
+        TableRow("9L", "8", 0.0, 0.009, 0.0, 0.0, 5),  # left jawbone
+        TableRow("9R", "8", 0.0, 0.009, 0.0, 0.0, 6),  # right jawbone
+    ],
+    tip="9L",
+)
+
+# Table 4.2, links 2 to 9R: mass [kg], height [m], radius [m]; then the cylinder's axis and the centre of mass as a
+# distance [m] along an axis of the link's frame of Table 3.1 (Table 4.1, Eq 4.17).  Fig 4.3 shows the axes of links 3
+# and 4; the other axes are chosen to reproduce Eq 6.7 and 6.10.  Link 6's centre is along -z; the printed [0, -lc6, 0]
+# is 0.4 m to the side.
+X, Y, Z = 0, 1, 2
+CYLINDERS = (
+    (0.5, 0.22, 0.035, Y, Y, 0.0),
+    (4.0, 0.19, 0.1, X, X, -0.34),
+    (0.7, 0.515, 0.07, X, X, -0.257),
+    (0.7, 0.26, 0.035, Z, Z, -0.3),
+    (0.079, 0.1, 0.07, Z, Z, -0.4),
+    (0.079, 0.4, 0.035, Y, Y, -0.252),
+    (0.04, 0.009, 0.005, X, X, -0.0045),
+    (0.01, 0.009, 0.005, X, X, -0.0045),
+    (0.01, 0.009, 0.005, X, X, -0.0045),
+)
+HOLDER = CHAIN.links.index("5")
+GUESSED_LC5 = 0.2  # [m] in the initial guesses of Tables 6.4-6.6; Table 4.1 prints 0.3
+WRIST_COORDINATES = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
+# Gear ratios are from Table 6.3, friction from the initial guesses of Tables 6.4-6.6.  The thesis gives no friction of
+# the wrist, and neglects the inertia of the motors (4.29).
+DRIVES = Drives(
+    gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
+    motor_inertia=np.zeros(7),
+    viscous=np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+    coulomb=np.array([1.0, 0.1, 3.0, 0.0, 0.0, 0.0, 0.0]),
+)
+BOX = {
+    Quality.MASS: (0.0, 5.0),  # [kg]
+    Quality.CENTRE: (0.0, 0.6),  # [m]; the longest bar measures 0.515 m
+    Quality.MOMENT: (0.0, 0.1),  # [kg m^2]
+    Quality.ROTOR: (0.0, 5e-5),  # [kg m^2]
+    Quality.VISCOUS: (0.0, 20.0),
+    Quality.COULOMB: (0.0, 20.0),
+}
+AXIS_INDEX = {"x": X, "y": Y, "z": Z}
+
+
+def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
+    """The links as uniform cylinders in the frames of Table 3.1, as Tables 4.1 and 4.2 state them.
+
+    The centre of the instrument holder is `lc5` [m] from the origin of its frame.
+    """
+    centres = np.zeros((len(CYLINDERS), 3))
+    for centre, (*_, axis, distance) in zip(centres, CYLINDERS, strict=True):
+        centre[axis] = distance
+    centres[HOLDER, Z] = -lc5
+    inertias = [cylinder(mass, height, radius, axis) for mass, height, radius, axis, _, _ in CYLINDERS]
+    # With six coordinates or fewer there is one jaw.
+    counts_from = np.array([7 if name == "9R" else 0 for name in CHAIN.links])
+    return Bodies(np.array([body[0] for body in CYLINDERS]), centres, np.array(inertias), counts_from)
+
+
+BODIES = in_table_frames().in_frames(CHAIN.of_links)  # in the frames of the dynamics
+GUESSED = in_table_frames(GUESSED_LC5)
+
+
+def motor(joint: int) -> tuple[Physical, ...]:
+    """Inertia of a joint's rotor, and friction of motor and joint together."""
+    guesses = (
+        (f"Jm{joint + 1}", Quality.ROTOR, DRIVES.motor_inertia),
+        (f"v{joint + 1}", Quality.VISCOUS, DRIVES.viscous),
+        (f"c{joint + 1}", Quality.COULOMB, DRIVES.coulomb),
+    )
+    return tuple(Physical(name, quality, float(x[joint]), *BOX[quality]) for name, quality, x in guesses)
+
+
+def part(name: str) -> Physical:
+    """A mass of a link such as m3, the distance lc3 of its centre from its frame's origin, or a moment such as Iy3."""
+    kind, letter, link = re.fullmatch("(m|lc|I)([xyz]?)(.+)", name).groups()  # type: ignore[union-attr]
+    i = CHAIN.links.index(link)
+    if kind == "m":
+        return Physical(name, Quality.MASS, float(GUESSED.masses[i]), *BOX[Quality.MASS], link)
+    if kind == "I":
+        axis = AXIS_INDEX[letter]
+        return Physical(name, Quality.MOMENT, float(GUESSED.inertias[i, axis, axis]), *BOX[Quality.MOMENT], link, axis)
+    axis = int(np.abs(GUESSED.centres[i]).argmax())
+    return Physical(name, Quality.CENTRE, float(-GUESSED.centres[i, axis]), *BOX[Quality.CENTRE], link, axis)
+
+
+def table(joint: int, names: str) -> PhysicalTable:
+    """The physical parameters of one of the arm's three joints: those of its motor, and of links."""
+    return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *map(part, names.split())))
+
+
+# (6.7) omits links 6 to 9.
+ROLL_PARTS = table(0, "m3 m4 m5 lc3 lc5 Iy2 Iy3 Ix4 Ix5")
+# (6.10) omits Iz7, which only adds to Iy6.  The signs printed there do not matter: the chain determines them.
+PITCH_PARTS = table(1, "m3 m4 m5 m6 m7 m8 m9L lc3 lc5 lc6 lc7 lc8 lc9L Iz3 Iy5 Iy6 Iy8 Iy9L")
+SLIDE_PARTS = table(2, "m6 m7 m8 m9L")
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
 SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
 TORQUE_CONSTANT = 0.0438  # [N m/A] of every motor; this and the gear ratios are from Table 6.3
 # Hand roll (6.8), hand pitch (6.11) and instrument slide (6.13), without the values that the thesis prints.
-ROLL = Joint(
-    "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, 200.0, TORQUE_CONSTANT
-)
+ROLL_TERMS = (inertia, gravity_sin, viscous, coulomb)
+ROLL = Joint("hand_roll", "Hand roll", Kind.REVOLUTE, ROLL_TERMS, HAND, 200.0, TORQUE_CONSTANT)
 PITCH_TERMS = (inertia, gravity_sin, gravity_cos, viscous, coulomb)
 PITCH = Joint("hand_pitch", "Hand pitch", Kind.REVOLUTE, PITCH_TERMS, HAND, 200.0, TORQUE_CONSTANT)
 SLIDE_TERMS = (lifted_mass, inertia, viscous, coulomb)

@@ -8,14 +8,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from davinci_forces import toml
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.bodies import Bodies, tensors
 from davinci_forces.maths.mechanics.chain import (
     BASE,
     FIXED,
@@ -52,7 +51,7 @@ def robot_of(table: TomlTable, stem: str) -> Robot | None:
     table.unique("joint", "name", ((i, joint.name) for i, joint in enumerate(joints) if joint), "two joints are named")
     valid_joints = tuple(joint for joint in joints if joint)
     chain = read_chain(table, valid_joints)
-    table.close()
+    table.close_all()
     return Robot(name, title, valid_joints, *chain) if valid_joints and len(valid_joints) == len(joints) else None
 
 
@@ -99,7 +98,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
     if "effort" in table and "torque_constant" in table:
         table.problem("torque_constant is not used where effort is in A; leave one of them out", "torque_constant")
-    table.close()
+    table.close_all()
     return changed
 
 
@@ -129,23 +128,17 @@ def _limits(table: TomlTable) -> Limits:
     if "effort" in limits:
         effort = limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
         changed = replace(changed, effort=effort)
-    limits.close()
     return changed
 
 
-class Geometry(NamedTuple):
-    """The chain of a robot, the bodies of its links if known, and its coordinates beyond the joints."""
+def read_chain(table: TomlTable, joints: Sequence[Joint]) -> tuple[Chain | None, Bodies | None, tuple[str, ...]]:
+    """Read the chain of a robot's file, the bodies of its links if known, and its coordinates beyond the joints.
 
-    chain: Chain | None = None
-    bodies: Bodies | None = None
-    wrist: tuple[str, ...] = ()
-
-
-def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
-    """Read the chain that a robot's file describes, with problems noted; empty if it has no [[link]]."""
+    Problems are noted.  Without [[link]] there is no chain.
+    """
     entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
-        return Geometry()
+        return None, None, ()
     convention = table.text("convention", "modified", tuple(CONVENTIONS))
     wrist = tuple(table.take("wrist", [], (list,), "a list of names", lambda names: all(type(x) is str for x in names)))
     kinds = {joint.name: joint.kind for joint in joints}
@@ -153,7 +146,6 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     for entry in entries:
         rows.append(_row(entry, [*BASE_NAMES, *(row.name for row in rows)], coordinates, kinds))
         weights.append(_weight(entry, rows[-1]))
-        entry.close()
     table.unique("link", "name", enumerate(row.name for row in rows), "two links are named")
     tip = table.text("tip", rows[-1].name, tuple(row.name for row in rows))
     unmoved = [name for k, name in enumerate(coordinates) if k not in {row.coordinate for row in rows}]
@@ -163,10 +155,10 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     if len(set(coordinates)) < len(coordinates):
         table.problem("wrist must name each coordinate beyond the joints once", "wrist")
     if table.file.problems():
-        return Geometry()
+        return None, None, ()
     chain = CONVENTIONS[convention](rows, tip)
     moving = [weight for row, weight in zip(rows, weights, strict=True) if row.coordinate != FIXED]
-    return Geometry(chain, _bodies(moving, chain) if any(moving) else None, wrist)
+    return chain, _bodies(moving, chain) if any(moving) else None, wrist
 
 
 def _row(table: TomlTable, parents: list[str], coordinates: list[str], kinds: dict[str, Kind]) -> TableRow:
@@ -193,18 +185,13 @@ def _weight(table: TomlTable, row: TableRow) -> tuple[float, ...]:
     mass = table.number("mass", low=0.0, expected="a number of kg")
     centre = table.numbers("centre", [0.0] * 3, 3)
     inertia = table.numbers("inertia", [0.0] * 6, 6, "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
-    if len(inertia) == 6 and np.linalg.eigvalsh(_tensor(inertia))[0] < 0:
+    if len(inertia) == 6 and np.linalg.eigvalsh(tensors(np.array([[0.0] * 4 + [*inertia]])))[0, 0] < 0:
         table.problem(f"inertia {excerpt(list(inertia))} has a negative principal moment, which no body has", "inertia")
     return (mass, *centre, *inertia)
-
-
-def _tensor(inertia: Sequence[float]) -> Array:
-    xx, xy, xz, yy, yz, zz = inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _bodies(weights: Sequence[tuple[float, ...]], chain: Chain) -> Bodies:
     """The bodies of the moving links, in the frames of the dynamics; links without a stated mass have mass 0."""
     stated = np.array([weight or (0.0,) * 10 for weight in weights])
-    tensors = np.array([_tensor(inertia) for inertia in stated[:, 4:].tolist()])
-    return Bodies(stated[:, 0], stated[:, 1:4], tensors, np.zeros(len(stated), np.int64)).in_frames(chain.of_links)
+    bodies = Bodies(stated[:, 0], stated[:, 1:4], tensors(stated), np.zeros(len(stated), np.int64))
+    return bodies.in_frames(chain.of_links)

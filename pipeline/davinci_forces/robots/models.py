@@ -93,9 +93,8 @@ def coupled_arm(
         raise ValueError(f"{robot.name} has no chain")
     names, joints = tuple(joint.name for joint in robot.joints), [robot.joints[row] for row in rows]
     friction = tuple((viscous, coulomb, *terms) for terms in added)
-    units = tuple(
-        {key: joint.unit(f"{{{key}}}") for key in ("inertia", "effort", "position", "gain")} for joint in joints
-    )
+    keys = ("inertia", "effort", "position", "gain")
+    units = tuple({key: joint.unit(f"{{{key}}}") for key in keys} for joint in joints)
     return CoupledArm(group, names, tuple(rows), robot.chain, friction, units, name)
 
 

@@ -14,7 +14,7 @@ from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.placed import transform
-from davinci_forces.maths.models.physical import PhysicalTable
+from davinci_forces.maths.models.physical import Lumping, PhysicalTable, physical_lumping
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia, lifted_mass, offset
 
 ANYWHERE = (-math.inf, math.inf)
@@ -89,6 +89,12 @@ class Joint:
         """Fill in the joint's units."""
         return self.kind.unit(template, self.effort)
 
+    @property
+    def dependence(self) -> Lumping | None:
+        """The dependence of its parameters on physical ones; None if these are unknown or make other parameters up."""
+        names = tuple(term.name for term in self.terms)
+        return physical_lumping(self.physical, self.gear_ratio, names) if self.physical else None
+
     def terms_under_gravity(self, loaded: bool) -> tuple[Term, ...]:
         """The terms of its model if gravity loads the joint, or does not; a prismatic joint feels a constant force."""
         weight = (gravity_sin, gravity_cos) if self.kind is Kind.REVOLUTE else (offset,)
@@ -143,10 +149,7 @@ class Robot:
     def with_tool(self, length: float) -> "Robot":
         """The robot with a tool whose shaft has this length [m].
 
-        Raises
-        ------
-        BadRobot
-            If the tool's part of the chain is unknown.
+        Raises BadRobot if the tool's part of the chain is unknown.
         """
         if self.tool is None or self.chain is None:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
@@ -159,10 +162,7 @@ class Robot:
         Positions, forces and the tip stay in base axes.  Each joint's model gets the gravity terms of this base, and
         loses its published parameters, which are of an upright base.
 
-        Raises
-        ------
-        BadRobot
-            If the robot has no chain, which tells how gravity loads its joints.
+        Raises BadRobot if the robot has no chain, which tells how gravity loads its joints.
         """
         if self.chain is None:
             raise BadRobot(f"robot {self.name} has no chain, so gravity on another base is not known; leave base out")
@@ -228,10 +228,7 @@ class Robot:
     def joint(self, name: str) -> Joint:
         """The joint with this name.
 
-        Raises
-        ------
-        BadRobot
-            If there is no such joint; the message lists the names.
+        Raises BadRobot if there is no such joint; the message lists the names.
         """
         for joint in self.joints:
             if joint.name == name:

@@ -8,7 +8,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
 from davinci_forces.maths.mechanics import kinematics
-from davinci_forces.maths.mechanics.bodies import Bodies, Drives
+from davinci_forces.maths.mechanics.bodies import Drives
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
@@ -49,7 +49,7 @@ def simulate_log(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     Raises as `_in_closed_loop` does.
     """
     if scenario.arm:
-        return _in_closed_loop(scenario, log)
+        return _in_closed_loop(scenario, scenario.arm, log)
     t = np.arange(round(log.duration * scenario.rate)) / scenario.rate
     return SimulatedRun(t, {name: _joint_motion(scenario, log, name, t) for name in log.joints})
 
@@ -66,14 +66,13 @@ def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) ->
     return SimulatedMotion(q, dq, tau, tau_ext)
 
 
-def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
+def _in_closed_loop(scenario: Scenario, simulated_arm: SimulatedArm, log: SimulatedLog) -> SimulatedRun:
     """Simulate the whole arm from rest at its first reference; the lead time is simulated but not recorded.
 
     Raises BadScenario if the motion diverges, for example because the gains are too high for the tick.
     """
-    simulated_arm, robot = cast(SimulatedArm, scenario.arm), scenario.robot
-    chain, bodies = _geometry(scenario)
-    names, n = [joint.name for joint in robot.joints], len(robot.joints)
+    chain, joints = scenario.robot.known_chain, scenario.robot.joints
+    names, n = [joint.name for joint in joints], len(joints)
     ticks = round(1 / (scenario.rate * simulated_arm.tick))
     skipped, samples = round(log.lead * scenario.rate), round(log.duration * scenario.rate)
     t = np.arange(-skipped, samples) / scenario.rate
@@ -81,7 +80,7 @@ def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     stops = np.array([scenario.joints[name].stops for name in names])
     friction = simulated_arm.families[log.family].friction
     body = JointConstraints(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
-    plant = arm(chain, bodies, simulated_arm.motors.gear_ratio**2 * simulated_arm.rotors)
+    plant = arm(chain, scenario.robot.known_bodies, simulated_arm.motors.gear_ratio**2 * simulated_arm.rotors)
     clock = Timing(simulated_arm.tick, ticks)
     instants = np.arange(len(t) * ticks, dtype=np.float64) * simulated_arm.tick - log.lead
     surroundings = _surroundings(log, chain, names, instants)
@@ -96,10 +95,6 @@ def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
         for i, name in enumerate(names)
     }
     return SimulatedRun(t[skipped:], {name: motions[name] for name in log.joints}, force)
-
-
-def _geometry(scenario: Scenario) -> tuple[Chain, Bodies]:
-    return cast(Chain, scenario.robot.chain), cast(Bodies, scenario.robot.bodies)
 
 
 def _surroundings(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -> Surroundings:
@@ -121,7 +116,7 @@ def _surroundings(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -
 
 def mass_position(scenario: Scenario) -> Array:
     """The position of a mass on the tip at q = 0, from the remote centre (3,) [m], base axes."""
-    chain, _ = _geometry(scenario)
+    chain = scenario.robot.known_chain
     return np.asarray(kinematics.tip(chain, np.zeros(len(scenario.robot.joints))) - kinematics.remote_centre(chain))
 
 
@@ -133,7 +128,7 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     """
     simulated_arm = cast(SimulatedArm, scenario.arm)
     friction = simulated_arm.families[family].friction
-    chain, bodies = _geometry(scenario)
+    chain, bodies = scenario.robot.known_chain, scenario.robot.known_bodies
     drives = Drives(simulated_arm.motors.gear_ratio, simulated_arm.rotors, friction.viscous, friction.coulomb_up)
     parameters = {}
     for i, joint in enumerate(scenario.robot.joints):

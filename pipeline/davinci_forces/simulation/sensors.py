@@ -31,13 +31,9 @@ class SimulatedChannel:
 
 
 def record(
-    simulated: SimulatedJoint,
-    motion: SimulatedMotion,
-    noise: SensorNoise,
-    rate: float,
-    current_unit: str,
+    simulated: SimulatedJoint, motion: SimulatedMotion, noise: SensorNoise, rate: float, current_unit: str,
     random: np.random.Generator,
-) -> list[SimulatedChannel]:
+) -> list[SimulatedChannel]:  # fmt: skip
     """Record the motor angle (6.28), the motor speed and the motor current (6.29) of one joint."""
     joint, N = simulated.joint, len(motion.q)
     angle, speed = (true + random.normal(0.0, sigma, N) for true, sigma in ((motion.q, noise.q), (motion.dq, noise.dq)))

@@ -5,7 +5,7 @@ here; parameters that it fitted to its recordings are compared with those of a s
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import cache
 from importlib.resources import files
@@ -14,15 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from davinci_forces.estimators.pso import MAX_ITERATIONS, PARTICLES, PATIENCE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.estimation.swarm import MAX_ITERATIONS, PARTICLES, PATIENCE
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.maths.models.physical import physical_lumping
 from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
-from davinci_forces.robots import davinci, davinci_chain
+from davinci_forces.robots import davinci
 from davinci_forces.robots.robot import Joint
 
 ROUNDING = 1e-9  # of a number that lies half a printed digit away
@@ -134,48 +133,30 @@ def text(results: Mapping[str, tuple[float, float]]) -> str:
 
 def links() -> dict[str, Array]:
     """The parameters of Table 3.1, from the chain."""
-    alpha, a, d, theta = np.array([row[2:6] for row in davinci_chain.CHAIN.table]).T
+    alpha, a, d, theta = np.array([row[2:6] for row in davinci.CHAIN.table]).T
     names = ("a [m]", "d [m]", "alpha [pi/2]", "theta at q = 0 [rad]")
     return dict(zip(names, (a, d, alpha / (pi / 2), theta), strict=True))
 
 
 def bodies() -> dict[str, Array]:
     """The distances of Table 4.1, whose printed signs are part of Eq 4.17, and Table 4.2, with one jaw."""
-    centres = np.abs(davinci_chain.in_table_frames().centres).max(axis=1)[:8]
-    mass, height, radius = np.array([body[:3] for body in davinci_chain.CYLINDERS[:8]]).T
+    centres = np.abs(davinci.in_table_frames().centres).max(axis=1)[:8]
+    mass, height, radius = np.array([body[:3] for body in davinci.CYLINDERS[:8]]).T
     sizes = {"mass of links 2 to 9 [kg]": mass, "height [m]": height, "radius [m]": radius}
     return {"l_c2 to l_c9 [m]": centres, **sizes}
 
 
-def factors(joint: Joint, term: Term, monomials: str) -> Array:
-    """The factors of monomials, such as m3 or m3 lc3, in one parameter of a joint."""
+def factors(joint: Joint, rows: Sequence[tuple[str, Term, str]]) -> dict[str, Array]:
+    """The factors of monomials, such as m3 or m3 lc3, in the parameters of a joint, from the chain; by title."""
     assert joint.physical is not None
-    lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    assert lumping is not None
-    place = [x.name.removesuffix("L") for x in joint.physical.parameters]
-    columns = [sorted(i for i in row if i < len(place)) for row in lumping.factors.tolist()]
-    wanted = (sorted(place.index(word) for word in monomial.split()) for monomial in monomials.split(", "))
-    return lumping.coefficients[joint.terms.index(term), [columns.index(monomial) for monomial in wanted]]
-
-
-def roll_factors() -> dict[str, Array]:
-    """The coefficients of (6.7), from the chain."""
-    parts = "m3, m4, m5, m3 lc3, m5 lc5"
+    assert joint.dependence is not None
+    place, coefficients = [x.name.removesuffix("L") for x in joint.physical.parameters], joint.dependence.coefficients
+    columns = [sorted(i for i in row if i < len(place)) for row in joint.dependence.factors.tolist()]
     return {
-        f"factors of {parts} in the inertia": factors(ROLL, inertia, parts),
-        f"of {parts} in the sine": factors(ROLL, gravity_sin, parts),
-    }
-
-
-def pitch_factors() -> dict[str, Array]:
-    """The coefficients of (6.10), from the chain."""
-    bars, wrist, masses = "m3, m5, m3 lc3, m5 lc5", "m6 lc6, m7 lc7, m8 lc8, m9 lc9", "m3, m4, m5, m6, m8"
-    return {
-        f"factors of {bars} in the inertia": factors(PITCH, inertia, bars),
-        f"of {wrist}": factors(PITCH, inertia, wrist),
-        f"of {masses} in the sine": factors(PITCH, gravity_sin, masses),
-        f"of {masses} in the cosine": factors(PITCH, gravity_cos, masses),
-    }
+        title.format(monomials): coefficients[joint.terms.index(term), [
+            columns.index(sorted(map(place.index, monomial.split()))) for monomial in monomials.split(", ")
+        ]] for title, term, monomials in rows
+    }  # fmt: skip
 
 
 def trajectory(joint: Joint, source: str) -> Fourier:
@@ -204,7 +185,7 @@ def limits() -> dict[str, Array]:
 def motors() -> dict[str, Array]:
     """The motors of Table 6.3."""
     constants = np.array([joint.torque_constant for joint in davinci.ROBOT.joints])
-    return {"gear ratio of motors 1 to 7": davinci_chain.DRIVES.gear_ratio, "K_m [N m/A] of motors 1 to 3": constants}
+    return {"gear ratio of motors 1 to 7": davinci.DRIVES.gear_ratio, "K_m [N m/A] of motors 1 to 3": constants}
 
 
 def counts() -> dict[str, Array]:
@@ -221,9 +202,8 @@ def parameters(joint: Joint) -> dict[str, Array]:
     MSE(theta) = MSE_LSE + d' (F' F / K) d, d = theta - theta_LSE, for the printed excitation without its misprints.
     """
     assert joint.physical is not None
-    lumping = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    assert lumping is not None
-    guess = lumping.theta(np.array([x.guess for x in joint.physical.parameters]))
+    assert joint.dependence is not None
+    guess = joint.dependence.theta(np.array([x.guess for x in joint.physical.parameters]))
     F = fourier.observation(joint.terms, trajectory(joint, joint.published[-1][0]))
     columns = {column.estimator: column for column in joint.printed}
     least = columns["lse"]
@@ -250,6 +230,17 @@ def measurement_noise() -> dict[str, Array]:
     return {"deviation of position [rad] and velocity [rad/s]": np.array([noise.q, noise.dq])}
 
 
+# The coefficients of (6.7) and (6.10).
+ROLL_FACTORS = (
+    ("factors of {} in the inertia", inertia, "m3, m4, m5, m3 lc3, m5 lc5"),
+    ("of {} in the sine", gravity_sin, "m3, m4, m5, m3 lc3, m5 lc5"),
+)
+PITCH_FACTORS = (
+    ("factors of {} in the inertia", inertia, "m3, m5, m3 lc3, m5 lc5"),
+    ("of {}", inertia, "m6 lc6, m7 lc7, m8 lc8, m9 lc9"),
+    ("of {} in the sine", gravity_sin, "m3, m4, m5, m6, m8"),
+    ("of {} in the cosine", gravity_cos, "m3, m4, m5, m6, m8"),
+)
 # Numbers that need no computation: gains, poses, the size of a swarm and when it ends, and the hanging mass with the
 # scale from the printed force.
 GAINS = {"K_p": np.array(davinci.K_P), "K_i": np.array(davinci.K_I), "K_d": np.array(davinci.K_D)}
@@ -268,8 +259,8 @@ FOUND: dict[str, Callable[[], dict[str, Array]]] = {
     "Table 5.2": lambda: POSES,
     "Table 5.3": lambda: POSES,
     "Table 5.4": lambda: GAINS,
-    "Eq 6.7-6.9": roll_factors,
-    "Eq 6.10-6.12": pitch_factors,
+    "Eq 6.7-6.9": lambda: factors(ROLL, ROLL_FACTORS),
+    "Eq 6.10-6.12": lambda: factors(PITCH, PITCH_FACTORS),
     "Table 6.1": excitation,
     "Table 6.2": limits,
     "Eq 6.28-6.29, Table 6.3": motors,

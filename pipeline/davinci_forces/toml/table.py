@@ -37,7 +37,7 @@ def excerpt(value: Any) -> str:
 
 
 class TomlTable:
-    """One table.  The keys that were asked for are the known ones; `close` reports the others.
+    """One table.  The keys that were asked for are the known ones; `close` and `close_all` report the others.
 
     A missing or wrong value is noted, and replaced by the default, or by NaN, "", () or an empty table.
     """
@@ -45,6 +45,7 @@ class TomlTable:
     def __init__(self, values: Any, file: TomlFile, path: KeyPath = (), place: str = "") -> None:
         self.file, self.path, self.place, self.asked = file, path, place, dict[str, None]()
         self.values: dict[str, Any] = values if isinstance(values, dict) else {}
+        self.opened: list[TomlTable] = []  # tables within this table that were asked for
         if not isinstance(values, dict):
             self.problem(f"must be a table, not {excerpt(values)}")
 
@@ -127,7 +128,8 @@ class TomlTable:
     def table(self, key: str) -> "TomlTable":
         """A table within this table; an empty table if the key is missing."""
         self.asked[key] = None
-        return TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key))
+        self.opened.append(TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key)))
+        return self.opened[-1]
 
     def subtables(self) -> list[tuple[str, "TomlTable"]]:
         """The tables within this table, by key."""
@@ -145,7 +147,9 @@ class TomlTable:
         if len(entries) > most:
             self.problem(f"it has {len(entries)} [[{key}]], more than the {most} allowed; split the file", key, most)
         place, entries = self._within(key), entries[:most]
-        return [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
+        tables = [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
+        self.opened += tables
+        return tables
 
     def unique(self, key: str, name: str, values: Iterable[tuple[int, str]], says: str) -> None:
         """Note the tables of a list that repeat the `name` of an earlier table; `values` are by table number."""
@@ -176,11 +180,19 @@ class TomlTable:
         return default
 
     def close(self, outdated: Collection[str] = ()) -> None:
-        """Report the keys that nothing asked for, except outdated ones, with the likely spelling."""
-        for key in (key for key in self.values if key not in self.asked and key not in outdated):
+        """Report the keys that nothing asked for, except outdated ones, with the likely spelling; each once."""
+        unknown = [key for key in self.values if key not in self.asked and key not in outdated]
+        for key in unknown:
             near_ones = [] if self.file.is_full else get_close_matches(key[:MAX_NAME_LENGTH], self.asked, 1, 0.5)
             meant = "".join(f"; did you mean {near!r}?" for near in near_ones)
             self.problem(f"unknown key {key!r}; known keys are {', '.join(self.asked) or 'none'}{meant}", key)
+        self.asked |= dict.fromkeys(unknown)
+
+    def close_all(self) -> None:
+        """Close this table, and all tables within it that were asked for."""
+        for table in self.opened:
+            table.close_all()
+        self.close()
 
     def _within(self, key: str) -> str:
         return f"{self.place}.{key}" if self.place else key

@@ -90,10 +90,7 @@ def damping_needed(hand: Hand, k_t: float, limit: Callable[[Hand], float]) -> fl
 def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
     """The K_T [N/m] below which the hand in contact is stable, if the force is held at `rate` [Hz] and delayed [s].
 
-    Raises
-    ------
-    BadRequest
-        If the delay has more than MAX_DELAY_SAMPLES samples.
+    Raises BadRequest if the delay has more than MAX_DELAY_SAMPLES samples.
     """
     if delay * rate > MAX_DELAY_SAMPLES:
         raise BadRequest(

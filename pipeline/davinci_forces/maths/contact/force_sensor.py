@@ -76,17 +76,12 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     return ForceErrors(*sizes, span, relative, relative_std, share, share_std)
 
 
-class Lag(NamedTuple):
-    """Delay [s] of one force behind another, NaN if they do not correlate."""
+def lag(
+    t: Array, estimated: Array, clock: Array, measured: Array, rate: float, compared: Booleans
+) -> tuple[float, float]:
+    """Delay [s] of a sensor (M, k) on its clock (M,) behind the estimated force (N, k) at times (N,), and its error.
 
-    value: float
-    std: float
-
-
-def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, compared: Booleans) -> Lag:
-    """Delay of a sensor (M, k) on its clock (M,) behind the estimated force (N, k) at times (N,).
-
-    `compared` (N,) selects samples; `rate` [Hz] is that of the estimate.
+    `compared` (N,) selects samples; `rate` [Hz] is that of the estimate.  NaN if the forces do not correlate.
     """
     step = np.ceil(MIN_LAG_STEP * rate - 1e-9) / rate
     lags = step * np.arange(-MAX_LAG_STEPS, MAX_LAG_STEPS + 1)
@@ -103,7 +98,7 @@ def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, 
         return _vertex(product / np.sqrt(np.maximum(f_power * sensor_power, 1e-300)), step)
 
     samples = list(products)
-    return Lag(peak(samples), standard_error(peak, samples))
+    return peak(samples), standard_error(peak, samples)
 
 
 def _vertex(c: Array, step: float) -> float:

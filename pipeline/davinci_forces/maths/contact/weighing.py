@@ -24,7 +24,7 @@ from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
-from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, of_left_out
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
@@ -73,9 +73,8 @@ def fit_mass(rows: Sequence[Rows]) -> MassEstimate:
     The residuals of a model repeat with the path: its sixths are nearly independent, but samples and periods are not.
     (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 11)
     """
-    without = np.array([_mass(rows, block) for block in range(PARTS)])
-    spread = (PARTS - 1) / PARTS * np.sum((without - without.mean()) ** 2)
-    return MassEstimate(_mass(rows), float(np.sqrt(spread)))
+    without = np.array([[_mass(rows, block)] for block in range(PARTS)])
+    return MassEstimate(_mass(rows), float(of_left_out(without)[0]))
 
 
 def _mass(rows: Sequence[Rows], without: int | None = None) -> float:

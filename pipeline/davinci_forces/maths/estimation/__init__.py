@@ -1,1 +1,1 @@
-"""Estimate parameters from data: least squares, their uncertainty, and particle swarms."""
+"""Estimate parameters from data: least squares and their uncertainty, conic programs, and drift."""

@@ -31,7 +31,7 @@ from davinci_forces.maths.excitation.joint import (
     shrink_into_limits,
 )
 from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_into_arm_limits
-from davinci_forces.maths.excitation.search import ReportStart
+from davinci_forces.maths.excitation.search import ReportStart, best_of_starts
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
@@ -57,13 +57,6 @@ class ArmExcitationProblem:
     joints: tuple[ExcitationProblem, ...]
     columns: NDArray[np.int64]  # indices of the base parameters' columns among all columns (p,)
     limits: ArmLimits
-
-
-class ArmDesign(NamedTuple):
-    """The designed trajectory of each joint, and the lowest criterion of each start (starts,)."""
-
-    series: list[Fourier]
-    optima: Array
 
 
 class Stage(NamedTuple):
@@ -138,32 +131,27 @@ def parameter_of(problem: ArmExcitationProblem, column: int) -> tuple[int | None
 
 def design_together(
     problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
-) -> ArmDesign:
-    """Design the trajectories of the best of several starts of the search; `report_start` reports each start.
+) -> tuple[list[Fourier], Array]:
+    """Design the trajectories of the best of several starts, and return the criterion of each start (starts,), too.
 
     Raises ValueError if a joint's limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
     if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
         raise ValueError(reason)
-    designs = list[tuple[float, list[Fourier]]]()
-    for start in range(starts):
-        designs.append(_design(problem, np.random.default_rng([seed, start])))
-        if report_start:
-            report_start(start + 1, starts, designs[-1][0])
-    value, series = min(designs, key=lambda design: design[0])
-    if not np.isfinite(value):
+    series, optima = best_of_starts(lambda random: _design(problem, random), starts, seed, report_start)
+    if not np.isfinite(optima).any():
         raise ValueError("no trajectory of these harmonics within the limits identifies all base parameters of the arm")
-    return ArmDesign(series, np.array([value for value, _ in designs]))
+    return series, optima
 
 
-def _design(problem: ArmExcitationProblem, random: np.random.Generator) -> tuple[float, list[Fourier]]:
+def _design(problem: ArmExcitationProblem, random: np.random.Generator) -> tuple[list[Fourier], float]:
     """The best trajectory of one start, and its criterion: explore many, refine a few, finish the best."""
     K, N = problem.joints[0].samples, max(joint.harmonics for joint in problem.joints)
     coarse, fine = Stage.with_samples(problem, min(K, SAMPLES_EXPLORED * N)), Stage.with_samples(problem, K)
     explored = [_descend(coarse, _random(coarse, random), 0, EXPLORATION)[0] for _ in range(EXPLORED)]
-    explored.sort(key=lambda z: _result(fine, z)[0])
+    explored.sort(key=lambda z: _result(fine, z)[1])
     refined = [_descend(fine, z, 0, SELECTION) for z in explored[:REFINED]]
-    z, multipliers = min(refined, key=lambda pair: _result(fine, pair[0])[0])
+    z, multipliers = min(refined, key=lambda pair: _result(fine, pair[0])[1])
     return _result(fine, _descend(fine, z, SELECTION, len(STAGES), multipliers)[0])
 
 
@@ -176,8 +164,8 @@ def _random(stage: Stage, random: np.random.Generator) -> Array:
     return np.concatenate(parts)
 
 
-def _result(stage: Stage, z: Array) -> tuple[float, list[Fourier]]:
-    """The criterion of a trajectory after it was shrunk into all limits, and that trajectory."""
+def _result(stage: Stage, z: Array) -> tuple[list[Fourier], float]:
+    """A trajectory shrunk into all limits, and its criterion."""
     joints = stage.problem.joints
     series = [
         shrink_into_limits(joint, Fourier.from_coefficients(x, joint.period))
@@ -185,8 +173,8 @@ def _result(stage: Stage, z: Array) -> tuple[float, list[Fourier]]:
     ]
     within = shrink_into_arm_limits(stage.problem.limits, series)
     if within is None:
-        return np.inf, series
-    return float(CRITERIA[joints[0].criterion](arm_observation(stage.problem, within))), within
+        return series, np.inf
+    return within, float(CRITERIA[joints[0].criterion](arm_observation(stage.problem, within)))
 
 
 def _descend(

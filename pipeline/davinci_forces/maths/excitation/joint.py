@@ -97,9 +97,8 @@ def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
     The trajectories within the limits are a convex set, so the factor follows from the exact extrema of the series.
     """
     scale = 1.0
-    for (low, high), (low_x, high_x), middle in zip(
-        problem.limits, ranges(series), (problem.centre[0], 0.0, 0.0), strict=True
-    ):
+    middles = (problem.centre[0], 0.0, 0.0)
+    for (low, high), (low_x, high_x), middle in zip(problem.limits, ranges(series), middles, strict=True):
         scale = max(scale, (high_x - middle) / (high - middle), (low_x - middle) / (low - middle))
     if scale == 1.0:
         return series

@@ -5,6 +5,7 @@ R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11
 """
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,24 +23,31 @@ CROSSING = 0.9  # share of the variables that a step changes
 
 Objective = Callable[[Array], Array]  # the objective (S,) of S candidates (S, d)
 ReportStart = Callable[[int, int, float], None]  # takes the number of a start, from 1, of all starts, and the optimum
+Result = TypeVar("Result")
 
 
 def minimise(
     objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart | None = None
 ) -> tuple[Array, Array]:
-    """Minimise from several starts: the best candidate (d,), and the lowest value of each start (starts,).
-
-    The first starts are the same for any number of starts.  `report_start` takes the number of a start, from 1, the
-    number of starts, and the optimum.
-    """
+    """Minimise from several starts: the best candidate (d,), and the lowest value of each start (starts,)."""
     np.empty(RETAINED)
-    optima = []
+    return best_of_starts(lambda random: descend(objective, d, random), starts, seed, report_start)
+
+
+def best_of_starts(
+    run: Callable[[np.random.Generator], tuple[Result, float]], starts: int, seed: int, report_start: ReportStart | None
+) -> tuple[Result, Array]:
+    """Search from several starts: the best result, and the optimum of each start (starts,).
+
+    The first starts are the same for any number of starts.
+    """
+    results = []
     for start in range(starts):
-        optima.append(descend(objective, d, np.random.default_rng([seed, start])))
+        results.append(run(np.random.default_rng([seed, start])))
         if report_start:
-            report_start(start + 1, starts, optima[-1][1])
-    values = np.array([value for _, value in optima])
-    return optima[int(values.argmin())][0], values
+            report_start(start + 1, starts, results[-1][1])
+    optima = np.array([optimum for _, optimum in results])
+    return results[int(optima.argmin())][0], optima
 
 
 def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[Array, float]:

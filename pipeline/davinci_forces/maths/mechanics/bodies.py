@@ -81,10 +81,10 @@ def as_bodies(parameters: Array) -> Bodies:
     masses = parameters[:, 0]
     centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
     weightless = Bodies(masses, centres, np.zeros((len(masses), 3, 3)), np.zeros(len(masses), np.int64))
-    return replace(weightless, inertias=_tensors(parameters) - weightless.about_frames())
+    return replace(weightless, inertias=tensors(parameters) - weightless.about_frames())
 
 
-def _tensors(parameters: Array) -> Array:
+def tensors(parameters: Array) -> Array:
     """The inertias (L, 3, 3) about the origins of the frames among inertial parameters (L, 10)."""
     inertias = np.zeros((len(parameters), 3, 3))
     inertias[:, *_UPPER] = parameters[:, 4:]
@@ -103,7 +103,7 @@ def pseudo_inertias(parameters: Array) -> Array:
     In a frame in which this frame has the pose T, it is T J T'.  Wensing, Kim and Slotine, Linear matrix inequalities
     for physically consistent inertial parameter identification, 2018.
     """
-    inertia, J = _tensors(parameters), np.zeros((len(parameters), 4, 4))
+    inertia, J = tensors(parameters), np.zeros((len(parameters), 4, 4))
     J[:, :3, :3] = np.trace(inertia, axis1=1, axis2=2)[:, None, None] / 2.0 * np.eye(3) - inertia
     J[:, :3, 3] = J[:, 3, :3] = parameters[:, 1:4]
     J[:, 3, 3] = parameters[:, 0]

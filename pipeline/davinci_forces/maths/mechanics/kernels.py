@@ -5,10 +5,8 @@ instructions.  Import this module inside the function that uses it.  To compile 
 takes longer than to compute thousands of samples with numpy.
 """
 
-from collections.abc import Callable
 from inspect import isfunction
 from math import cos, sin
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,12 +18,9 @@ from davinci_forces.maths.mechanics import link, recursions
 LANES = 32  # samples
 
 
-def _functions(module: ModuleType) -> list[Callable[..., object]]:
-    return [f for f in vars(module).values() if isfunction(f) and f.__module__ == module.__name__]
-
-
-for _function in (*_functions(link), *_functions(recursions)):  # a call inside a loop prevents vector instructions
-    register_jitable(forceinline=True, no_cfunc_wrapper=True)(_function)
+for _function in {**vars(link), **vars(recursions)}.values():  # a call inside a loop prevents vector instructions
+    if isfunction(_function) and _function.__module__ in (link.__name__, recursions.__name__):
+        register_jitable(forceinline=True, no_cfunc_wrapper=True)(_function)
 
 
 @register_jitable(forceinline=True, no_cfunc_wrapper=True)  # type: ignore[untyped-decorator]

@@ -104,9 +104,8 @@ def regressor(
     tree = tree_of(chain.with_coordinates(n), np.zeros((len(chain.parent), 10)))
     moves = tree.moves & np.isin(np.arange(n), rows)
     work, Y = np.zeros(((n + 1) * (L + 1), 9, N)), np.zeros((n, L, 10, N))
-    recursions.regressor(
-        tree._replace(parent=tree.parent[:L], moves=moves).lists(), GRAVITY, _joints(q, dq, ddq), work, Y, ALL
-    )
+    first_links = tree._replace(parent=tree.parent[:L], moves=moves).lists()
+    recursions.regressor(first_links, GRAVITY, _joints(q, dq, ddq), work, Y, ALL)
     return np.moveaxis(Y[rows], -1, 0).reshape(*q.shape[:-1], len(rows), 10 * L)
 
 

@@ -15,10 +15,9 @@ from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, BaseParameters, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
-from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.memory import PIECE_SAMPLES, efforts, friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor
-from davinci_forces.maths.models.terms import Term
+from davinci_forces.maths.models.terms import COULOMB, VISCOUS, Term
 
 ADDED = ("rotor inertia", "spring", "offset")  # parameters of the drive and the cables of each joint
 NOT_NEGATIVE = (True, True, False)  # of `ADDED`: a spring pulls back, and an offset has either sign

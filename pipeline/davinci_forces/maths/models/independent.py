@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import COULOMB, Coefficients, bias
 from davinci_forces.maths.models.memory import efforts, friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
-from davinci_forces.maths.models.terms import Term
+from davinci_forces.maths.models.terms import COULOMB, Coefficients, Term, bias
 
-# The functions in `bias`, of q, dq and z.
+# The functions `COEFFICIENTS`, of q, dq and z.
 FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {
     "1": lambda q, dq, z: 1.0,
     "sin q": lambda q, dq, z: np.sin(q),

@@ -6,9 +6,9 @@ Import this module inside the function that uses it: to compile it or to load it
 from typing import Any
 
 from davinci_forces.maths.compiled import compile_and_store, inline
-from davinci_forces.maths.models import bias as derivation
+from davinci_forces.maths.models import terms
 
-deflect = inline(derivation.deflect)
+deflect = inline(terms.deflect)
 
 
 @compile_and_store

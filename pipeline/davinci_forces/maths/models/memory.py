@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
-from davinci_forces.maths.models.bias import deflect
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.maths.models.terms import Z_OF_MOTION, Term
+from davinci_forces.maths.models.terms import Z_OF_MOTION, Term, deflect
 from davinci_forces.maths.signals.smoothing import segments
 
 RUN_IN = 3.0  # travel, in displacements, after which the initial deflection has decayed to exp(-2 RUN_IN)

@@ -23,7 +23,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
-from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.terms import Coefficients
 
 
 class Mechanism(NamedTuple):

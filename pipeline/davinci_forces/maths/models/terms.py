@@ -1,22 +1,33 @@
-"""The terms of a joint model.
+"""The terms of a joint model, and its bias.
 
 A joint model is linear in its parameters (6.8), and each of its terms is linear in acceleration:
 
     tau = sum_i theta_i phi_i,        phi_i = a_i ddq + b_i(q, dq)
 
 One tuple of terms therefore gives the regressor for identification, and inertia, bias and its derivatives for the
-filter.  b_i is a linear combination of the functions `COEFFICIENTS` of `bias`.
+filter.  b_i is a linear combination of the functions `COEFFICIENTS`, and so is the bias of a joint:
+
+    b(q, dq) = c_1 + c_s sin q + c_c cos q + c_q q + c_v dq + c_f sign(dq) + c_z z                     (7.15), (7.16)
+
+z is the deflection of the presliding friction, which follows from the measured motion (Dahl 1968):
+
+    z+ = s - (s - z) exp(-|dq| T_s / x_0),        s = sign(dq)
+
+This is exact for constant velocity over a sample.  `bias` is for arrays of samples; `filters.sample` has that of one.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.models.bias import COEFFICIENTS, Coefficients
 
+COEFFICIENTS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")
+VISCOUS, COULOMB = COEFFICIENTS.index("dq"), COEFFICIENTS.index("sign(dq)")
+Coefficients = tuple[float, ...]
 Z_OF_MOTION: dict[str, Callable[[Array, Array], Array]] = {  # z of terms that depend on position and velocity only
     "|dq|": lambda q, dq: np.abs(dq),
     "|dq| dq": lambda q, dq: np.abs(dq) * dq,
@@ -30,6 +41,22 @@ Z_OF_MOTION: dict[str, Callable[[Array, Array], Array]] = {  # z of terms that d
     "sin 3q": lambda q, dq: np.sin(3.0 * q),
     "cos 3q": lambda q, dq: np.cos(3.0 * q),
 }
+
+
+def bias(c: Coefficients, q: Any, dq: Any, z: Any) -> tuple[Any, Any, Any]:
+    """b and its derivatives by q and dq, for floats or arrays of one shape; c in the order of `COEFFICIENTS`.
+
+    The derivative of sign(dq) is taken as zero, as in section 7.1.2.
+    """
+    sine, cosine = np.sin(q), np.cos(q)
+    b = c[0] + c[1] * sine + c[2] * cosine + c[3] * q + c[4] * dq + c[5] * np.sign(dq) + c[6] * z
+    return b, c[1] * cosine - c[2] * sine + c[3], c[4]
+
+
+def deflect(z: Any, dq: Any, T_s: float, x_0: float) -> Any:
+    """The deflection z, -1 to 1, one sampling time T_s [s] later; it reverses within the displacement `x_0`."""
+    sign = np.sign(dq)
+    return sign - (sign - z) * np.exp(-np.abs(dq) * T_s / x_0)
 
 
 @dataclass(frozen=True)
@@ -127,6 +154,4 @@ OF_MOTION = {
     )
 }
 
-TERMS = {
-    term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)
-}
+TERMS = {t.name: t for t in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)}

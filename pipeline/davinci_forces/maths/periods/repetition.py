@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.signals.windows import runs
 
 POINTS = 1024  # a search reduces a recording to this number of points, each the mean of neighbouring samples
 MIN_PERIOD_POINTS = 4  # a period of fewer points is not searched
@@ -84,11 +85,12 @@ def _search(x: Array) -> Repetition | None:
         return None
     good = [lag for lag, value in lows.items() if value <= MAX_RATIO_PERIOD * best + ROUNDED]
     bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * least[lag], MIN_BOUND_RUN) for lag in good}
-    runs = {lag: _longest(differences[lag], lag, min(bound, DIP)) for lag, bound in bounds.items()}
-    longest = max(stop - start for start, stop in runs.values())
+    spans = {lag: _longest(differences[lag], lag, min(bound, DIP)) for lag, bound in bounds.items()}
+    longest = max(stop - start for start, stop in spans.values())
     if longest < MIN_RUN_SHARE * n:
         return None
-    lag, (start, stop) = next((lag, run) for lag, run in runs.items() if run[1] - run[0] >= MIN_LENGTH_RATIO * longest)
+    lag = next(lag for lag, (start, stop) in spans.items() if stop - start >= MIN_LENGTH_RATIO * longest)
+    start, stop = spans[lag]
     core = start + int(differences[lag][start : stop - 2 * lag + 1].argmin())
     exact = _shortest([low for low in lows if low <= lag], points[:, core : core + 2 * lag])
     end = x.shape[1] if stop == n else stop * factor
@@ -142,8 +144,5 @@ def _differences(x: Array) -> Iterator[tuple[int, Array]]:
 
 def _longest(difference: Array, lag: int, most: float) -> tuple[int, int]:
     """The longest run of spans that differ by at most `most`: from its first point to the end of its last span."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (difference <= most).view(np.int8), [0]])))
-    if not len(edges):
-        return 0, 0
-    at = int((edges[1::2] - edges[::2]).argmax())
-    return int(edges[2 * at]), int(edges[2 * at + 1]) - 1 + 2 * lag
+    run = max(runs(difference <= most), key=lambda run: run.stop - run.start, default=None)
+    return (run.start, run.stop - 1 + 2 * lag) if run else (0, 0)

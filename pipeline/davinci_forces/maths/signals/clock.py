@@ -46,8 +46,7 @@ class ClockStatistics:
             return
         if self.samples == 0:
             self.first = float(t[0])
-        steps = np.diff(t, prepend=[self.last] if self.samples else t[:1])[0 if self.samples else 1 :]
-        self._steps(t, steps)
+        self._steps(t, np.diff(np.append(self.last, t) if self.samples else t))
         if channels:
             repeats = np.ones(len(t), dtype=bool)
             for number, x in enumerate(channels):

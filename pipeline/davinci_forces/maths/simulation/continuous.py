@@ -13,7 +13,6 @@ from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics.kernels import mass_and_bias
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import Plant
-from davinci_forces.maths.simulation.control import lyapunov
 
 RELATIVE, ABSOLUTE = 1e-7, 1e-10
 
@@ -34,7 +33,8 @@ def regulate(
     """Drive the arm from rest at q (n,) to `target` (n,) under PD or PID with gravity compensation.
 
     `plant` is the arm, and `model` is the arm that the gravity compensation assumes, both made by `arm`.  `viscous`
-    (n,) is the friction.  The samples are the solver's steps, so that V is not interpolated.  (5.8), (5.9), (5.17)
+    (n,) is the friction.  The samples are the solver's steps, so that V = dq' M dq / 2 + e' K_p e / 2 is not
+    interpolated; under PD with gravity compensation it never rises.  (5.8), (5.9), (5.17)
     """
     n = len(q)
     M, b, G, rest = np.empty((n, n)), np.empty(n), np.empty(n), np.zeros(n)
@@ -68,5 +68,6 @@ def regulate(
     V, efforts = np.empty(len(states)), np.empty((len(states), n))
     for k, state in enumerate(states):
         efforts[k] = effort(*state)
-        V[k] = lyapunov(M + inertia, state[1], law.proportional, target - state[0])
+        dq, error = state[1], target - state[0]
+        V[k] = dq @ (M + inertia) @ dq / 2 + error @ (law.proportional * error) / 2
     return Regulated(solution.t, states[:, 0], states[:, 1], efforts, V)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.simulation.actuators import Motors
 
@@ -73,8 +72,3 @@ def read(motors: Any, q: Any, angle: Any) -> None:
         angle[j] = motors.gear_ratio[j] * q[j]
         if motors.encoder_step[j] > 0:
             angle[j] = motors.encoder_step[j] * np.rint(angle[j] / motors.encoder_step[j])
-
-
-def lyapunov(M: Array, dq: Array, proportional: Array, error: Array) -> float:
-    """V = dq^T M dq / 2 + e^T K_p e / 2, which never rises under PD with gravity compensation.  (5.9)"""
-    return float(dq @ M @ dq / 2 + error @ (proportional * error) / 2)

@@ -199,10 +199,9 @@ def evaluate_pushes(
     """
     probing = probing if everything or windows else orient_into_tissue(probing)
     pushes = parts(probing, windows)
-    reach = int(np.ceil(rate / (2 * cutoff)))
     numbers = _numbers(probing, pushes)
     return [
-        _pushed(probing, part, number, way, bool(everything or windows), rate, cutoff, reach)
+        _pushed(probing, part, number, way, bool(everything or windows), rate, cutoff)
         for part, number, way in zip(pushes, numbers, ways(probing, pushes), strict=True)
     ]
 
@@ -214,11 +213,11 @@ def _numbers(probing: Probing, pushes: Sequence[slice]) -> list[int]:
 
 
 def _pushed(
-    probing: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float,
-    reach: int,
-) -> PalpatedPush:  # fmt: skip
+    probing: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float
+) -> PalpatedPush:
     (depth, force), speed = way, probing.speed[part]
-    counted = moves(speed, float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE)), reach)
+    usual = float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE))
+    counted = moves(speed, usual, int(np.ceil(rate / (2 * cutoff))))
     contact = indentation.all_of(depth, counted) if stated else indentation.find_contact(depth, force, counted)
     d_rate = np.zeros(len(depth))
     if rate and len(depth) > 1:

@@ -42,9 +42,7 @@ def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Bl
 
 def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
     """Bootstrap the standard error of the mean of numbers (n,), one a block."""
-    if len(values) < 2:
-        return float("nan")
-    return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
+    return _error_of_sums(np.asarray(values), np.ones(len(values), np.int64), seed)
 
 
 def error_of_pooled_mean(x: Array, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:

@@ -11,15 +11,18 @@ correlated, so n uncorrelated ones are counted.  As in conformal prediction, the
 95 %.  The model's error differs from log to log, and a few logs hardly show by how much.  So v is multiplied by the
 square of Student's 95 % point over 1.96.  Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World (2005).
 
-`levels` checks the coverage of the resulting band on samples without contact.
+`levels` checks the coverage of the resulting band on samples without contact.  `day_offset` is a constant effort that
+differs from day to day: the mean without contact, and its drift.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans, Integers, evenly, row_blocks
-from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, error_of_quantile
+from davinci_forces.maths.signals.windows import is_outside
+from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean, error_of_pooled_mean, error_of_quantile
 
 SPEED_RANGES = 4  # ranges of speed, between quartiles of the calibrating motion
 LOG_BLOCKS = 6  # blocks of a log: each counts as a degree of freedom of the model's error
@@ -31,6 +34,7 @@ TINY = 1e-12  # size of an error of 0, so that it has a logarithm
 NORMAL_95 = 1.959963984540054
 MIN_SAMPLES_QUARTILES = 100
 MAX_SAMPLES_BOOTSTRAP = 20_000  # of more samples, evenly spaced ones are drawn
+MIN_DRIFT_ERRORS = 2.0  # a day offset that differs by more standard errors between the halves of a log drifts
 
 
 class FreeErrors(NamedTuple):
@@ -181,3 +185,35 @@ def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
         coverage=float(np.mean(inside)),
         coverage_std=error_of_coverage(inside, count_uncorrelated(tau_ext[samples] / std[samples])),
     )
+
+
+class DayOffset(NamedTuple):
+    """An offset with its standard error, and its drift from the first to the second half of the samples."""
+
+    value: float
+    std: float
+    drift: float
+    drift_std: float
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the halves differ by more than `MIN_DRIFT_ERRORS` standard errors."""
+        return abs(self.drift) > MIN_DRIFT_ERRORS * self.drift_std
+
+
+def day_offset(t: Array, residual: Array, windows: Sequence[tuple[float, float]]) -> DayOffset:
+    """Average the residual effort (N,) of a model in windows [s] in which nothing touches the robot.
+
+    Without windows, or with fewer than two samples in them, the offset is 0 with error 0.
+    """
+    inside = residual[~is_outside(t, windows)]
+    if len(inside) < 2:
+        return DayOffset(0.0, 0.0, 0.0, 0.0)
+    (first, first_std), (last, last_std), (value, std) = map(_mean, (*np.array_split(inside, 2), inside))
+    return DayOffset(value, std, last - first, float(np.hypot(first_std, last_std)))
+
+
+def _mean(x: Array) -> tuple[float, float]:
+    """The mean of correlated samples and its standard error."""
+    parts = [float(x[part].mean()) for part in blocks(len(x))]
+    return float(x.mean()), error_of_mean(parts) if len(parts) > 1 else float(abs(x[0]))

@@ -18,7 +18,7 @@ import numpy as np
 from davinci_forces.errors import BadRobot
 from davinci_forces.files import read_bytes
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias, tensors
 from davinci_forces.maths.mechanics.placed import transform
 from davinci_forces.robots.robot import MOST_LINKS
 from davinci_forces.toml import TomlFile, excerpt
@@ -197,12 +197,11 @@ def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
     if m < 0:
         notes.problem(f"the mass is {m:g} kg, but must be 0 or more", mass)
     tensor = stated.child("inertia")
-    xx, xy, xz, yy, yz, zz = (notes.number(tensor, key, 0.0) for key in TENSOR)
-    values = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    about_centre = np.array([[0.0] * 4 + [notes.number(tensor, key, 0.0) for key in TENSOR]])
+    values = np.linalg.eigvalsh(tensors(about_centre))[0]
     if values[0] < -max(ROUNDING * abs(values).max(), NEGLIGIBLE_INERTIA):
         wrong = f"the smallest principal moment of inertia is {values[0]:.3g} kg m^2, but must be 0 or more"
         notes.problem(f"{wrong}; correct its signs, or leave the inertial out", tensor)
-    about_centre = np.array([[0.0, 0.0, 0.0, 0.0, xx, xy, xz, yy, yz, zz]])
     T, J = notes.pose(stated.child("origin")), pseudo_inertias(about_centre)[0]
     J[3, 3] = m
     return np.asarray(of_pseudo_inertias((T @ J @ T.T)[None])[0])

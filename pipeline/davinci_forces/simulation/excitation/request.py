@@ -110,16 +110,16 @@ def _of_arm(
     request: Request, robot: Robot, problem: ArmExcitationProblem, noise: list[float], report_start: ReportStart | None
 ) -> Answer:
     try:
-        design = design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)
+        series, optima = design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
-    F = arm_observation(problem, design.series)
+    F = arm_observation(problem, series)
     value, cond = float(CRITERIA[request.criterion](F)), float(10 ** condition(F))
     standard_errors = _standard_errors(robot, problem, F, noise) if request.noise else ()
-    parts = zip(robot.joints, problem.joints, design.series, strict=True)
+    parts = zip(robot.joints, problem.joints, series, strict=True)
     return Answer(
         [ExcitationTrajectory(*part) for part in parts],
-        ArmExcitation(value, cond, F.shape[-1], tuple(design.optima.tolist()), problem.limits, standard_errors),
+        ArmExcitation(value, cond, F.shape[-1], tuple(optima.tolist()), problem.limits, standard_errors),
     )
 
 

@@ -47,7 +47,6 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
     for key in (key for key, move in moves.items() if isinstance(move, Path) and not families):
         problem = f"moves.{key} is a path; joints that follow their model exactly need a Fourier series"
         table.problem(problem, "moves", key)
-    table.close()
     return logs
 
 
@@ -85,15 +84,12 @@ def _of_arm(
         entry = table.table("tissue")
         damping = entry.number("damping", 0.0, low=0.0)
         tissue = Tissue(entry.number("surface"), entry.number("stiffness", above=0.0), damping)
-        entry.close()
     if "sensor" in table:
         entry = table.table("sensor")
         sensor = ForceSensor(entry.number("noise", 0.0, low=0.0), entry.number("lag", 0.0, low=0.0))
-        entry.close()
     recorded_families = table.texts("families", list(families), families)
     roles_table = table.table("role_in")
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
-    roles_table.close()
     shared = replace(log, lead=lead, skip=skip, mass=mass, tip=tip, tissue=tissue, sensor=sensor)
     if len(families) == 1:
         return [replace(shared, family=families[0], role=roles[families[0]])]
@@ -109,15 +105,12 @@ def _move(table: TomlTable) -> Fourier | Path:
         ease = table.flag("ease", False)
         if any(b[0] <= a[0] for a, b in pairwise(points)):
             table.problem("the times of path must increase", "path")
-        table.close()
         return Path(points or ((0.0, 0.0), (1.0, 0.0)), ease)
     a, b = table.numbers("a"), table.numbers("b")
     if len(a) != len(b) or not a:
         table.problem(f"a and b must have one number for each harmonic, not {len(a)} and {len(b)}")
         a = b = (0.0,)
-    series = Fourier(table.number("a0", 0.0), a, b, table.number("period", above=0.0))
-    table.close()
-    return series
+    return Fourier(table.number("a0", 0.0), a, b, table.number("period", above=0.0))
 
 
 def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
@@ -135,5 +128,4 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
         table.problem(f"end must be after start = {start:g}, not {end:g}", "end")
     if end > duration and not math.isnan(duration):
         table.problem(f"end = {end:g} s is after the end of the recording at {duration:g} s", "end")
-    table.close()
     return SimulatedPush(shape, start, end, peak, direction)

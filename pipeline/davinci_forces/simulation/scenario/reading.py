@@ -72,7 +72,7 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
     title, seed, started = table.text("title", name), table.whole("seed"), table.text("started")
     if started and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", started):
         table.problem(f"started must be a date and time such as '2016-05-02T09:00:00', not {started!r}", "started")
-    table.close()
+    table.close_all()
     return Scenario(name, title, robot, seed, rate, started, joints, logs, arm, jitter, harmonics)
 
 
@@ -93,12 +93,9 @@ def _joint(robot: Robot, name: str, table: TomlTable, whole_arm: bool) -> Simula
         noise = noise_of(table)
         values = table.table("theta")
         theta = tuple(values.number(term.name) for term in joint.terms)
-        values.close()
     label = table.text("label", joint.title)
     encoder, current = table.number("encoder_step", 0.0, low=0.0), table.number("current_step", 0.0, low=0.0)
-    stops = read_stops(table, (-1e9, 1e9))
-    table.close()
-    return SimulatedJoint(joint, label, encoder, current, stops, noise, theta)
+    return SimulatedJoint(joint, label, encoder, current, read_stops(table, (-1e9, 1e9)), noise, theta)
 
 
 def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) -> SimulatedArm:
@@ -119,7 +116,6 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
         **{key: _list(arm, key, n, True) for key in ("resistance", "inductance", "current_limit", "voltage_limit")},
     )
     control = _control(arm.table("control"), n)
-    arm.close()
     families = {name: _family(entry, robot) for name, entry in table.table("family").subtables()}
     if not families:
         table.problem("it has no [family.<name>], which states the friction and noise of the arm")
@@ -128,17 +124,13 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
 
 def _control(table: TomlTable, n: int) -> Cascade | Regulator:
     """Read the control law: the laboratory's cascade, PID with gravity compensation (chapter 5), or none (Fig 4.5)."""
-    law: Cascade | Regulator
     name = table.text("law", "cascade", ("cascade", "pid", "none"))
     if name == "none":
-        law = Regulator(np.zeros(n), np.zeros(n), np.zeros(n), 0.0)
-    elif name == "pid":
+        return Regulator(np.zeros(n), np.zeros(n), np.zeros(n), 0.0)
+    if name == "pid":
         K_p, K_d, K_i = (_list(table, key, n) for key in ("proportional", "derivative", "integral"))
-        law = Regulator(K_p, K_d, K_i, table.number("gravity", 1.0, low=0.0))
-    else:
-        law = Cascade(*(_list(table, key, n) for key in Cascade._fields))
-    table.close()
-    return law
+        return Regulator(K_p, K_d, K_i, table.number("gravity", 1.0, low=0.0))
+    return Cascade(*(_list(table, key, n) for key in Cascade._fields))
 
 
 def _list(table: TomlTable, key: str, n: int, positive: bool = False) -> Array:
@@ -155,17 +147,11 @@ def _family(table: TomlTable, robot: Robot) -> Family:
         viscous, coulomb, static, *stribeck_and_bristles = read_friction(entry)
         rows.append((viscous, *coulomb, *static, *stribeck_and_bristles))
         noise[joint.name] = noise_of(entry)
-        entry.close()
-    table.close()
     return Family(Friction(*(np.array(column) for column in zip(*rows, strict=True))), noise)
 
 
 def noise_of(table: TomlTable) -> SensorNoise:
     """Read the noise of one joint."""
     values = table.table("noise")
-    noise = SensorNoise(
-        **{key: values.number(key, 0.0, low=0.0) for key in ("q", "dq", "tau", "drift")},
-        correlation=values.number("correlation", 1.0, above=0.0),
-    )
-    values.close()
-    return noise
+    sizes = {key: values.number(key, 0.0, low=0.0) for key in ("q", "dq", "tau", "drift")}
+    return SensorNoise(**sizes, correlation=values.number("correlation", 1.0, above=0.0))

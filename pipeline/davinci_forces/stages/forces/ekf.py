@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, rts
+from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, tracker
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise, rounding_error
@@ -12,7 +12,7 @@ from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
-from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
+from davinci_forces.maths.uncertainty.error_band import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Joint
@@ -56,7 +56,7 @@ def track_effort(
     late = lag_error(parts, smoothed, noise)
     variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
-    smooth_rise = rise(rts.track, parts[0], noise)
+    smooth_rise = rise(tracker(SMOOTHER), parts[0], noise)
     rounding = np.concatenate([
         rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
         for part in segments(model.segment)
@@ -109,8 +109,8 @@ def variance_of(model: JointModel, band: ErrorBand | None, own: Array, is_centre
     """The variance (N,) of the smoothed effort, the mean of its standard error, and their source; `total_variance`."""
     if band is None:
         return own**2, 0.0, ""
-    total = total_variance(band, model.log, model.path, model.dq, own, is_centred)
-    return total.variance, float(np.mean(total.std)), total.source
+    variance, std, source = total_variance(band, model.log, model.path, model.dq, own, is_centred)
+    return variance, float(np.mean(std)), source
 
 
 def rms(x: Array) -> float:

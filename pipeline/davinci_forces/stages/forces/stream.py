@@ -8,8 +8,7 @@ from davinci_forces.filters import DEFAULT, diverges, filter_blocks
 from davinci_forces.filters.online import Window, delay_of
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
-from davinci_forces.identification.joint_models import LogModels
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics
 from davinci_forces.maths.models.model import ArmMotion

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from davinci_forces.filters import ekf
+from davinci_forces.filters import DEFAULT, ekf, tracker
 from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import smallest_q_tau, steady_std
 from davinci_forces.filters.tuning import tune_noise
@@ -69,5 +69,5 @@ def std_with_delay(inertia: float, medians: dict[str, float], delay: float) -> f
     """Standard deviation of the external effort by a filter that shows a push within `delay` [s]."""
     T_s, viscous = 1.0 / medians["rate"], medians["viscous"]
     noise = NoiseModel(medians["r_q"], medians["r_dq"], 0.0, medians["r_tau"] * T_s / inertia, 0.0)
-    walk = smallest_q_tau(ekf.track, inertia, viscous, T_s, noise, delay)
+    walk = smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay)
     return steady_std(inertia, viscous, T_s, noise._replace(q_tau=walk))

@@ -9,8 +9,7 @@ from davinci_forces.filters.innovations.search import MAX_SAMPLES_SEARCH, CauseS
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
 from davinci_forces.filters.problem import FilterInput, Recording, filter_inputs
 from davinci_forces.filters.response import noise_model
-from davinci_forces.identification.joint_models import LogModels, refit_effort
-from davinci_forces.identification.used import Identified
+from davinci_forces.identification.joint_models import Identified, LogModels, refit_effort
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import is_far_from_reversals

@@ -17,11 +17,11 @@ from davinci_forces.identification.chosen import (
     select_candidate,
 )
 from davinci_forces.identification.identifiability import excite_command, join_names
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.observations import Observed, is_evaluated, observe
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
-from davinci_forces.identification.used import Identified
 from davinci_forces.maths.selection import standard_error
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
@@ -150,6 +150,7 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
             candidate=np.array([c.name for c in selection.candidates], object),
             variant=np.array([c.variant for c in selection.candidates], object),
             parameters=np.array([c.size for c in selection.candidates]),
+            **selection.scores,
         )
 
 

@@ -19,11 +19,11 @@ from davinci_forces.identification.identifiability import (
     moving_with,
     why_not_positive,
 )
-from davinci_forces.identification.left_out import left_out
 from davinci_forces.identification.model_error import model_std
 from davinci_forces.identification.observations import CellEquations, Observed, block_equations, observe, pose_samples
 from davinci_forces.identification.regression import join_regressions, known_of, pose
 from davinci_forces.identification.scores import folds, refits
+from davinci_forces.identification.unseen import left_out
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
@@ -130,7 +130,7 @@ def fit_joint(
         estimates[name] = estimate
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
-        yield from (swarm_search(model, name, search, regression) for search in estimate.searches)
+        yield from (swarm_search(model, name, search, regression) for search in estimate.run_searches())
     yield from identifiability(model, regression, estimates, robot, others)
     yield from cost_of_consistency(model.group, regression, estimates, robot.joint(model.group).unit("{effort}"))
     if len(parts) > 1:
@@ -150,9 +150,9 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
     library = Library(every, (), CellEquations(np.zeros(1, int), cells, cells, cells))
     candidates = variants(robot, "independent", {model.group: reach}, [library])
     try:
-        R = regression.triangle
-        noise_std = standard_errors(regression, regression.weight, R, R.theta).noise
-        return model_std(candidates[0].parts[0], R.theta, noise_std, candidates, len(parts))
+        theta = regression.triangle.theta
+        noise_std = standard_errors(regression, theta).noise
+        return model_std(candidates[0].parts[0], theta, noise_std, candidates, len(parts))
     except (NotIdentifiable, np.linalg.LinAlgError):
         return 0.0
 
@@ -264,6 +264,7 @@ def fit_record(
         r2=r2,
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
+        correlated_lags=round(estimate.standard_errors.lags),
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
@@ -271,6 +272,7 @@ def fit_record(
         positive=np.array([parameter.positive for parameter in model.parameters], float),
         theta_std_noise=estimate.standard_errors.noise,
         theta_std_model=estimate.standard_errors.model,
+        theta_std_classical=estimate.standard_errors.classical,
     )
 
 

@@ -5,10 +5,9 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 
 from davinci_forces.identification.identifiability import are_negative
-from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
+from davinci_forces.identification.joint_models import FALLBACK, Identified, LogModels, at_samples, refits_of
 from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
-from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.averaging import Phases
 from davinci_forces.maths.signals.faults import beyond_steps
@@ -83,7 +82,7 @@ def predict_joint(
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", severity, *texts)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
-        yield scorer.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
+        yield scorer.score(model, estimator, entry.role, path, along.tau_hat(fit, motion.joint))
 
 
 def apply(

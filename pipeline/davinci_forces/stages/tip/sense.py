@@ -121,11 +121,11 @@ def sensor_force(
     if int(tested.sum()) < MIN_SAMPLES_ERROR:
         return
     error = errors(estimate.f[tested], estimate.C[tested], measured[tested])
-    late = lag(estimate.t, estimate.f, clock, sensor, rate, tested)
+    sensor_lag, sensor_lag_std = lag(estimate.t, estimate.f, clock, sensor, rate, tested)
     drawn = size(estimate) if estimate.f.shape[1] > 1 else estimate
     yield SensorForce.like(
-        error, log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), sensor_lag=late.value,
-        sensor_lag_std=late.std, t=estimate.t,
+        error, log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), sensor_lag=sensor_lag,
+        sensor_lag_std=sensor_lag_std, t=estimate.t,
         measured_force=measured[:, 0] if measured.shape[1] == 1 else np.linalg.norm(measured, axis=1),
         estimated_force=drawn.f[:, 0], estimated_force_std=np.sqrt(drawn.C[:, 0, 0]),
     )  # fmt: skip

@@ -11,10 +11,10 @@ from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
-from davinci_forces.identification.used import FALLBACK, Identified
+from davinci_forces.identification.joint_models import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.models.terms import COULOMB, VISCOUS
 from davinci_forces.records.forces import Comparison, FilterNoise
 from davinci_forces.records.model import Fit
 from davinci_forces.records.tissue import HandLimit, HapticMotion, HapticResponse, HapticRun, StabilityLimit, Stiffness

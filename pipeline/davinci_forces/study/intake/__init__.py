@@ -10,8 +10,8 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import FILLED_IN
 from davinci_forces.logs.log import Block, Channel, Log
 from davinci_forces.maths.arrays import Booleans
-from davinci_forces.maths.periods.steps import steps
 from davinci_forces.maths.signals.clock import ClockStatistics
+from davinci_forces.maths.signals.faults import steps
 from davinci_forces.maths.units import SI, UNITS, canonical, measures, size, unit_among_words
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
