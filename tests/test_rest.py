@@ -185,6 +185,19 @@ def test_a_step_as_the_controller_starts_or_stops_is_named_and_not_scored(identi
     assert_allclose(model.t[model.unscored > 0][[0, -1]], (start, end), atol=0.02)
 
 
+@pytest.mark.parametrize("role", ["validation", "contact"])
+def test_an_effort_with_a_wrong_sign_is_named_and_a_hard_push_is_not(identified, role):
+    right = arm.signal("hand_roll", periods=3, seed=5, role=role, log="check")
+    push = np.where((right.t > 2.0) & (right.t < 4.0), 2.0 * np.abs(right.tau).max(), 0.0)
+    for log, wrong in (
+        (replace(right, tau=-right.tau), True),
+        (right, False),
+        (replace(right, tau=right.tau + push), False),
+    ):
+        _, remarks = judged(log, identified[0])
+        assert any("check/hand_roll: the effort is the opposite of the model's" in x for x in remarks) == wrong
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(identified, seed):
     """Friction twice as large, which jumps at reversals, of which one log has one, near its start; and a push."""

@@ -8,7 +8,7 @@ from davinci_forces.identification.identifiability import are_negative
 from davinci_forces.identification.joint_models import FALLBACK, Identified, LogModels, at_samples, refits_of
 from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
-from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.periods.averaging import Phases
 from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.signals.smoothing import lowpass_segments
@@ -21,6 +21,7 @@ from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
+OPPOSED = 0.5  # the error by the other sign, over the error, of an effort with a wrong sign
 MIN_LOST = 0.01  # share of a log that is not scored, from which a warning says so
 
 
@@ -80,9 +81,22 @@ def predict_joint(
         severity = "warning" if lost > MIN_LOST else "note"
         texts = [step_warning(name, *step) for step in steps]
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", severity, *texts)
+    if labelled:
+        yield from sign_warning(motion, along.tau_hat(labelled[-1][2], motion.joint), free)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
         yield scorer.score(model, estimator, entry.role, path, along.tau_hat(fit, motion.joint))
+
+
+def sign_warning(motion: Motion, tau_hat: Array, free: Booleans) -> Iterator[Diagnostic]:
+    """Warn of an effort that the model (N,) explains far better with the other sign, at free samples (N,)."""
+    wrong, right = (float(np.std((motion.tau - sign * tau_hat)[free])) for sign in (1.0, -1.0))
+    if right < OPPOSED * wrong:
+        text = (
+            f"{motion.log}/{motion.joint}: the effort is the opposite of the model's, whose error falls from "
+            f"{wrong:.2g} to {right:.2g} by the other sign; correct the `sign` of its effort or position in study.toml"
+        )
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}.sign", "warning", text)
 
 
 def apply(
