@@ -9,7 +9,7 @@ import pytest
 
 from davinci_forces.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, schemas
+from davinci_forces.runner.fingerprint import Fingerprint, schemas
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import log_and_joint

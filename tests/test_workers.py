@@ -16,7 +16,7 @@ import pytest
 
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.execution import Outcome
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprint import Fingerprint
 from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, required_steps
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import workers

@@ -10,8 +10,7 @@ from davinci_forces import __version__
 from davinci_forces.files import read_bytes, write_bytes
 from davinci_forces.records import KINDS
 from davinci_forces.robots.robot import Kind
-from davinci_forces.runner.fingerprints.code import code
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of, schemas
+from davinci_forces.runner.fingerprint import Fingerprint, code, hash_of, schemas
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import ANY, Located, Places, is_about_log, log_and_joint
 from davinci_forces.runner.signature import Declaration, stage_of

@@ -14,8 +14,7 @@ from davinci_forces.records import KINDS, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, error_message, without_folders
-from davinci_forces.runner.fingerprints.code import code, package_fingerprint
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of
+from davinci_forces.runner.fingerprint import Fingerprint, code, hash_of, package_fingerprint
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.places import Located
 from davinci_forces.runner.plan import Plan, Task
