@@ -8,13 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from davinci_forces.errors import BadLog, install
 from davinci_forces.files import require_file
-from davinci_forces.logs.isolated.process import ChildEnded, Message, child
+from davinci_forces.logs.isolated.process import Answer, ChildEnded, Message, child
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
-from davinci_forces.maths.arrays import Array
 
 SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
 BYTES_PER_SECOND = 5e6  # until a block: an index may be long
@@ -77,14 +75,10 @@ class IsolatedLog(Log):
 def _request(path: Path, reader: str) -> Message:
     size = _size(path)
     return {
-        "reader": reader,
-        "path": str(path.absolute()),
-        "names": None,
-        "size": size,
-        "seconds": SECONDS + size / BYTES_PER_SECOND,
-        "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
+        "reader": reader, "path": str(path.absolute()), "names": None, "size": size,
+        "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
         "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
-    }
+    }  # fmt: skip
 
 
 def _size(path: Path) -> int:
@@ -95,7 +89,7 @@ def _size(path: Path) -> int:
     return sum(file.stat().st_size for file in files)
 
 
-def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], list[Array]]]:
+def _answers(path: Path, request: Message) -> Iterator[Answer]:
     problem = ""
     try:
         with child() as reading:
