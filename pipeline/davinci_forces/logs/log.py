@@ -90,6 +90,7 @@ class Log:
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN of every channel read
     dropped: int = 0  # unusable rows
     cut: bool = False  # the file is truncated, so channels may end in missing samples
+    unread: dict[str, str] = field(default_factory=dict)  # by channel whose samples are not clear, why
     lent: dict[str, str] = field(default_factory=dict)  # by channel without a clock, the one whose clock it is given
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
     _indexed: tuple[tuple[Channel, ...], dict[str, Channel], set[str]] = field(
@@ -120,8 +121,10 @@ class Log:
             if not 0 <= name < len(written):
                 raise BadLog(f"{self.path}: there is no column {name}; its {len(written)} columns are counted from 0")
             return written[name]
-        exact = [channel for channel in self.channels if channel.name == name]
-        exact = exact or [channel for channel in self.channels if channel.alias == name]
+        by_name, _ = self._index()
+        if name in by_name:
+            return by_name[name]
+        exact = [channel for channel in self.channels if channel.alias == name]
         last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
         if len(exact or last) == 1:
             return (exact or last)[0]
@@ -156,14 +159,10 @@ class Log:
         """Group names of channels by their clock: its time channel, or "" for the clock of the log."""
         _, clocks = self._index()
         grouped: dict[str, list[str]] = {}
-        for name, channel in zip(names, self._find_all(names), strict=True):
+        for name in names:
+            channel = self.find(name)
             grouped.setdefault(channel.name if channel.name in clocks else channel.time, []).append(name)
         return grouped
-
-    def _find_all(self, names: Sequence[str]) -> list[Channel]:
-        """Find many channels; a search for each would take the square of the time."""
-        by_name, _ = self._index()
-        return [by_name.get(name) or self.find(name) for name in names]
 
     def _index(self) -> tuple[dict[str, Channel], set[str]]:
         """Index the channels by name, and the names of clocks: once, as a log may have a clock for each channel."""
@@ -173,14 +172,16 @@ class Log:
         return self._indexed[1:]
 
     def _restart(self, names: Sequence[str]) -> None:
-        """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""
+        """Reset the counts before blocks are read, and refuse channels that do not hold numbers of one meaning."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
-        for name, channel in zip(names, self._find_all(names), strict=True):
-            if channel.kind not in SAMPLED_KINDS:
-                raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
+        if problem := next((self.unread[name] for name in names if name in self.unread), ""):
+            raise BadLog(f"{self.path}: {problem}")
+        for name in names:
+            if (kind := self.find(name).kind) not in SAMPLED_KINDS:
+                raise BadLog(f"{self.path}: channel {name!r} holds {kind}, not numbers; choose another")
         if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 

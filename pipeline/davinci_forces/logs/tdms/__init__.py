@@ -86,12 +86,9 @@ class TdmsLog(Log):
     scales: dict[str, dict[str, Any]] = field(default_factory=dict)  # properties of other scaled channels, by path
     origin: int = 0  # [s] since 1904; the zero of time stamps
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived time channels
-    mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel mean two things
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples; shorter channels are filled up with NaN."""
-        if problem := next((self.mixed[name] for name in names if name in self.mixed), ""):
-            raise BadLog(f"{self.path}: {problem}")
         yield from read_ahead(self._timed(names))
 
     def _timed(self, asked_for: Sequence[str]) -> Iterator[Block]:
@@ -155,7 +152,7 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
         # The first property that changes the meaning of samples: a unit or a scale.
         word = next((word for word in first if word.lower() in UNIT_PROPERTIES or word.startswith("NI_Scal")), "")
         if word and path in latest:
-            log.mixed[log.names[path]] = (
+            log.unread[log.names[path]] = (
                 f"channel {log.names[path]!r} has {word} = {first[word]!r} first and {properties[path][word]!r} in a "
                 "later file segment, so its samples mean two things; split the file, or record it again"
             )

@@ -49,7 +49,7 @@ def read(path: Path, options: Options) -> Log:
     return TextLog(
         path, "text", shown, time=time, started=dated.first_moment if dated else "",
         zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
-        encoding=options.encoding, warnings=list(dialect.remarks),
+        encoding=options.encoding, warnings=list(dialect.remarks), unread=dialect.unread,
     )  # fmt: skip
 
 
@@ -60,12 +60,7 @@ class TextLog(Log):
     dialect: Dialect = field(kw_only=True)
     encoding: str | None = None
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        for i, why in self.dialect.unread.items():
-            if (name := self.dialect.channels[i].name) in names:
-                raise BadLog(f"{self.path}: column {i} ({name}) {why}")
-        self._restart(names)
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
 

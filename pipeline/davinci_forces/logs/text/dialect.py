@@ -41,7 +41,7 @@ class Dialect:
     quoted: bool  # whether cells are quoted
     framed: bool  # whether rows begin or end with a pipe
     marked: bool  # whether rows begin with the mark of a comment
-    unread: dict[int, str]  # why columns of text are read neither as numbers nor as times
+    unread: dict[str, str]  # by channel of text, why it is read neither as numbers nor as times
     remarks: tuple[str, ...]  # on changed names, units by the size of numbers, and unread columns
 
     @property
@@ -78,15 +78,15 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
     described = zip(unique(header.names), units, kinds, header.aliases, strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
-    remarks = unread | {i: f"holds {columns[i][-1]}, the date as a count: its unit is {counted[i]}" for i in counted}
+    counts = {i: f"holds {columns[i][-1]}, the date as a count: its unit is {unit}" for i, unit in counted.items()}
+    remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in (unread | counts).items()}
     return Dialect(
-        delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first, unread=unread,
+        delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
         header_lines=frozenset(line.strip() for line in lines[:first] if line.strip()),
         names=tuple(header.names) if any(header.names) else (), preamble=tuple(header.preamble), framed=framed,
-        quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])), remarks=(
-            *renaming_remarks(header.names, [channel.name for channel in channels]),
-            *(f"column {i} ({channels[i].name}) {remark}" for i, remark in remarks.items()),
-        ),
+        quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])),
+        unread={channels[i].name: remarks[i] for i in unread},
+        remarks=(*renaming_remarks(header.names, [channel.name for channel in channels]), *remarks.values()),
     )  # fmt: skip
 
 
