@@ -227,7 +227,7 @@ def read_ahead(blocks: Iterator[Block]) -> Iterator[Block]:
     """
     gathered = _gathered(blocks)
     block = next(gathered, None)
-    if block and not _is_full(_rows(block), len(block)):
+    if block and not _is_full(row_count(block), len(block)):
         yield block
     elif block:
         with ThreadPoolExecutor(max_workers=1) as reader:
@@ -242,15 +242,16 @@ def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
     rows = 0
     for block in blocks:
         waiting.append(block)
-        rows += _rows(block)
+        rows += row_count(block)
         if _is_full(rows, len(block)):
-            yield _joined(waiting)
+            yield concatenate(waiting)
             waiting, rows = [], 0
     if rows:
-        yield _joined(waiting)
+        yield concatenate(waiting)
 
 
-def _rows(block: Block) -> int:
+def row_count(block: Block) -> int:
+    """The number of rows of a block."""
     return len(next(iter(block.values()), ()))
 
 
@@ -258,7 +259,8 @@ def _is_full(rows: int, channels: int) -> bool:
     return rows >= BLOCK_ROWS or rows * channels >= BLOCK_CELLS
 
 
-def _joined(blocks: Sequence[Block]) -> Block:
+def concatenate(blocks: Sequence[Block]) -> Block:
+    """Join consecutive blocks of the same channels."""
     if len(blocks) == 1:
         return blocks[0]
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}

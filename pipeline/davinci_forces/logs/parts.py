@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, row_count, unique
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
@@ -129,7 +129,7 @@ class Parts(Log):
         others = [name for name in names if name != time]
         counted = [] if part_time or others else sorted(clock_channels)[:1]  # gives the number of samples
         for block in part.blocks([*others, *([part_time] if part_time else []), *counted]):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             t = axis.read(number, part, part_time, block[part_time]) if part_time else axis.count(number, part, count)
             yield {name: t if name == time else block[name] for name in names}
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, unique
+from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, row_count, unique
 from davinci_forces.logs.tdms import samples
 from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, set_clocks
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBER_CODES, TIME, Objects, names
-from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, Queue, pieces, rows_of, side_by_side
+from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
 from davinci_forces.logs.timeline import Timeline, moment
 
@@ -97,7 +97,7 @@ class TdmsLog(Log):
         written = [name for name in asked_for if name not in timelines]
         row = 0
         for block in self._blocks(written) if written else _rows(timelines):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             block |= {name: timeline.times(row, count) for name, timeline in timelines.items()}
             yield {name: block[name] for name in asked_for}
             row += count
@@ -105,11 +105,11 @@ class TdmsLog(Log):
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
         path_of = {name: path for path, name in self.names.items()}
         paths = [path_of[name] for name in dict.fromkeys(asked_for)]
-        plain = self.index.groups([path for path in paths if path not in self.scaled])
-        scaled = self.index.groups([path for path in paths if path in self.scaled])
+        plain, scaled = ([path for path in paths if (path in self.scaled) is is_scaled] for is_scaled in (False, True))
+        groups = [*self.index.groups(plain), *self.index.groups(scaled)]
         with open_file(self.path) as file:
-            queues = [Queue(self._source(file, group), group) for group in (*plain, *scaled)]
-            for block, lacking in side_by_side(queues, rows_of(len(paths))):
+            sources = [self._source(file, group) for group in groups]
+            for block, lacking in side_by_side(sources, groups, rows_of(len(paths))):
                 missing = {self.names[path]: count for path, count in lacking.items()}
                 yield self.count_nans({self.names[path]: samples for path, samples in block.items()}, missing)
 

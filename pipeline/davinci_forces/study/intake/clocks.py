@@ -8,7 +8,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import Alignment, Follower, TimedBlock, align
-from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log
+from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log, row_count
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.units import since_1970
 from davinci_forces.maths.units import size as size_of
@@ -149,7 +149,7 @@ class UsedClocks:
     def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:
         rows = 0
         for block in log.blocks(list(dict.fromkeys((*group.names, *([group.time] if group.time else []))))):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             yield self.times(block, rows, count, group), block
             rows += count
 
