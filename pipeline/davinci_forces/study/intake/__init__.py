@@ -38,13 +38,10 @@ def touch_of(reading: "Intake", block: Block, t: Column, selected: Booleans) -> 
         for name, quantity in TOUCH_COLUMNS.items()
     }
     return Touch(
-        log=reading.entry.name,
-        role=reading.entry.role,
-        sample=(reading.rows + np.arange(len(t)))[selected],
-        push=_pushes(reading, block, len(t))[selected],
-        t=(t if reading.clocks.all_timed else unknown)[selected],
+        log=reading.entry.name, role=reading.entry.role, sample=(reading.rows + np.arange(len(t)))[selected],
+        push=_pushes(reading, block, len(t))[selected], t=(t if reading.clocks.all_timed else unknown)[selected],
         **{name: column[selected] for name, column in columns.items()},
-    )
+    )  # fmt: skip
 
 
 def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
@@ -150,17 +147,11 @@ class Intake:
             assert q is not None
             assert tau is not None
             yield Recording(
-                log=self.entry.name,
-                joint=name,
-                role=self.entry.role,
-                rate=self.clock.rate,
-                velocity="derived" if dq is None else "logged",
-                t=(t - first)[selected],
-                q=q[selected],
-                dq=np.zeros(int(selected.sum())) if dq is None else dq[selected],
-                tau=tau[selected],
+                log=self.entry.name, joint=name, role=self.entry.role, rate=self.clock.rate,
+                velocity="derived" if dq is None else "logged", t=(t - first)[selected], q=q[selected],
+                dq=np.zeros(int(selected.sum())) if dq is None else dq[selected], tau=tau[selected],
                 filled=block[FILLED_IN][selected].astype(np.int64),
-            )
+            )  # fmt: skip
         if touch := touch_of(self, block, t - first, selected & (block[FILLED_IN] == 0)):
             yield touch
         self.rows += len(t)

@@ -34,18 +34,8 @@ def summary(intake: Intake) -> LogSummary:
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
     rate, duration, jitter, longest_gap = times if intake.clocks.all_timed else (float("nan"),) * 4
     return LogSummary.like(
-        clock,
-        log=entry.name,
-        role=entry.role,
-        format=log.format,
-        files=entry.files,
-        started=log.started,
-        zone=log.zone,
-        rows=clock.samples,
-        rate=rate,
-        duration=duration,
-        jitter=jitter,
-        longest_gap=longest_gap,
+        clock, log=entry.name, role=entry.role, format=log.format, files=entry.files, started=log.started,
+        zone=log.zone, rows=clock.samples, rate=rate, duration=duration, jitter=jitter, longest_gap=longest_gap,
         dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
@@ -54,7 +44,7 @@ def summary(intake: Intake) -> LogSummary:
         feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
         nulls=np.array([log.nulls.get(name, 0) for name in names]),
         nans=np.array([log.nans.get(name, 0) for name in names]),
-    )
+    )  # fmt: skip
 
 
 def remarks(intake: Intake) -> Iterator[str]:
