@@ -111,6 +111,10 @@ class Log:
         """Read the samples of channels of one clock that hold numbers or times."""
         raise NotImplementedError
 
+    def bad(self, problem: str) -> BadLog:
+        """The error of a problem of this log, which names its file."""
+        return BadLog(f"{self.path}: {problem}")
+
     def find(self, name: str | int) -> Channel:
         """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
 
@@ -119,7 +123,7 @@ class Log:
         if isinstance(name, int):
             written = [channel for channel in self.channels if not channel.derived]
             if not 0 <= name < len(written):
-                raise BadLog(f"{self.path}: there is no column {name}; its {len(written)} columns are counted from 0")
+                raise self.bad(f"there is no column {name}; its {len(written)} columns are counted from 0")
             return written[name]
         by_name, _ = self._index()
         if name in by_name:
@@ -129,12 +133,12 @@ class Log:
         if len(exact or last) == 1:
             return (exact or last)[0]
         if last:
-            raise BadLog(f"{self.path}: {len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
+            raise self.bad(f"{len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
         names = [channel.name for channel in self.channels]
         close = get_close_matches(name, names, n=3, cutoff=0.5)
         near = [channel for channel in self.channels if channel.name in close]
         hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
-        raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
+        raise self.bad(f"there is no channel {name!r} among its {len(names)}; {hint}")
 
     def times_called(self, name: str | int) -> list[Channel]:
         """List the time channels that a study means by a name: one, or one of that name in each group of channels.
@@ -178,12 +182,12 @@ class Log:
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
         if problem := next((self.unread[name] for name in names if name in self.unread), ""):
-            raise BadLog(f"{self.path}: {problem}")
+            raise self.bad(problem)
         for name in names:
             if (kind := self.find(name).kind) not in SAMPLED_KINDS:
-                raise BadLog(f"{self.path}: channel {name!r} holds {kind}, not numbers; choose another")
+                raise self.bad(f"channel {name!r} holds {kind}, not numbers; choose another")
         if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
-            raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
+            raise self.bad(f"{', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
     def count_nans(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
         """Count the NaNs of a block and return it: `missing` of each channel are missing, the others logged."""

@@ -55,9 +55,7 @@ class IsolatedLog(Log):
             self.nans |= message["nans"]
             budget -= sum(column.nbytes for column in columns)
             if budget < 0:
-                raise BadLog(
-                    f"{self.path}: its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}"
-                )
+                raise self.bad(f"its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}")
             if columns:
                 yield dict(zip(names, columns, strict=True))
             if end := message.get("end"):

@@ -197,7 +197,7 @@ class BagLog(Log):
         try:
             return _layout(connection, content, topic.first)
         except Unlike as how:
-            raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record these separately") from None
+            raise self.bad(f"message {number} of {topic.name} {how}; record these separately") from None
 
     def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
         """The samples of a channel in messages of one layout."""
@@ -207,8 +207,8 @@ class BagLog(Log):
         if place := layout.numbers.get(quantity):
             return numbers_at(place, table)
         joint = topic.first.numbers[quantity].joint
-        raise BadLog(
-            f"{self.path}: message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
+        raise self.bad(
+            f"message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
             "the first message has; record these separately"
         )
 

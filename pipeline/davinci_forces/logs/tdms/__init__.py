@@ -126,7 +126,7 @@ class TdmsLog(Log):
         try:
             yield from read
         except Exception as error:
-            raise BadLog(f"{self.path}: npTDMS cannot read channel {path} ({error})") from error
+            raise self.bad(f"npTDMS cannot read channel {path} ({error})") from error
 
 
 def _rows(timelines: Mapping[str, Timeline]) -> Iterator[Block]:
@@ -145,7 +145,7 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
     log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW)
     for path in latest:
         if problem := samples.problem(scales := _scales(properties, path)):
-            raise BadLog(f"{log.path}: channel {path} {problem}")
+            raise log.bad(f"channel {path} {problem}")
         if scales and path not in log.scaled:
             log.scales[path] = scales
     for path, first in walk.objects.revised.items():

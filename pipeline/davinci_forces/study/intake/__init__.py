@@ -6,7 +6,6 @@ from itertools import chain
 
 import numpy as np
 
-from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import FILLED_IN
 from davinci_forces.logs.log import Block, Channel, Log
 from davinci_forces.maths.arrays import Booleans
@@ -51,8 +50,8 @@ def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
     numbers = reading.to_si(block, "push")
     odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
     if len(odd):
-        raise BadLog(
-            f"{reading.log.path}: channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
+        raise reading.log.bad(
+            f"channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
             f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push must be whole; name another "
             "channel, or leave push out and the pushes are detected"
         )
@@ -85,14 +84,11 @@ class Intake:
             self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
         )
         if not self.clocks.all_timed and self.entry.needs_clock and not self.clocks.are_several:
-            raise BadLog(
-                f"{self.log.path}: the log has no clock; name its time channel in [log.channels], "
-                "or give rate = ... [Hz]"
-            )
+            raise self.log.bad("the log has no clock; name its time channel in [log.channels], or give rate = ... [Hz]")
         has_seconds = self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)
         if not self.clocks.all_timed and has_seconds:
-            raise BadLog(
-                f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
+            raise self.log.bad(
+                "the log has no clock, but skip, until and contact windows are in seconds; give "
                 'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
             )
         self.names = list(dict.fromkeys([*used, *([self.clocks.time] if self.clocks.time else [])]))
@@ -105,8 +101,8 @@ class Intake:
         if misread or source.scale != 1.0:  # the stated unit is the unit after scaling
             log_unit = ""
         if source.unit and log_unit in UNITS and log_unit != source.unit:
-            raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
+            raise self.log.bad(
+                f"channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
                 f"{source.unit!r}; correct the unit of {source.quantity} in study.toml, or leave it out"
             )
         unit = source.unit or log_unit or SI[source.measures]
@@ -115,8 +111,8 @@ class Intake:
         if measures(unit) != source.measures:
             what = f"measures {measures(unit)}" if unit in UNITS else "is an unknown unit"
             fitting = ", ".join(u for u in UNITS if measures(u) == source.measures)
-            raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
+            raise self.log.bad(
+                f"channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
                 f"{source.quantity} needs {source.measures}; give its unit in study.toml, one of {fitting}"
             )
         return size(unit)
@@ -198,8 +194,8 @@ class Intake:
         if not len(bad):
             return
         row = self.rows + int(bad[0])
-        raise BadLog(
-            f"{self.log.path}: channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
+        raise self.log.bad(
+            f"channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
             f"of the {len(values)} rows read with it lack a number; record the log again, or save the part before this "
             "row as a separate log"
         )
@@ -208,8 +204,8 @@ class Intake:
         """Refuse a clock that stands still or goes back, with the row."""
         clock = self.clock
         if clock.backward or clock.repeated:
-            raise BadLog(
-                f"{self.log.path}: time does not increase at row {clock.bad_row} (counted from 0): "
+            raise self.log.bad(
+                f"time does not increase at row {clock.bad_row} (counted from 0): "
                 f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
                 "or give rate = ... [Hz] to count samples instead"
             )
