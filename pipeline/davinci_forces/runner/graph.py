@@ -10,7 +10,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from davinci_forces.report import REPORT
-from davinci_forces.runner.places import is_about_log
+from davinci_forces.runner.plan import is_about_log
 from davinci_forces.runner.signature import Declaration, declaration, stage_of, steps
 from davinci_forces.stages import GROUPS, STAGES
 

@@ -16,8 +16,7 @@ from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, error_message, without_folders
 from davinci_forces.runner.fingerprint import Fingerprint, code, hash_of, package_fingerprint
 from davinci_forces.runner.ledger import Ledger
-from davinci_forces.runner.places import Located
-from davinci_forces.runner.plan import Plan, Task
+from davinci_forces.runner.plan import Located, Plan, Task
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
