@@ -228,8 +228,5 @@ def _read(file: str) -> Entry:
     content = text[: -len(SEAL.format("0" * 64))] + "\n}"
     if not text.endswith(SEAL.format(hash_of_text(content))):
         raise ValueError("it is not as a stage wrote it")
-    return check(
-        Entry(**json.loads(content)),
-        os.path.basename(os.path.dirname(file)),
-        os.path.basename(file).removesuffix(".json"),
-    )
+    stage, name = file.split(os.sep)[-2:]
+    return check(Entry(**json.loads(content)), stage, name.removesuffix(".json"))
