@@ -67,9 +67,8 @@ class Places:
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
             of_joint = joint if {"joint", "group"} & {*kind.KEY} else ANY
-            located += tuple(
-                self._sorted(kind, [log], of_joint) if log and is_about_log(kind) else self._of_all(kind, of_joint)
-            )
+            of_log = log and is_about_log(kind)
+            located += tuple(self._sorted(kind, [log], of_joint) if of_log else self._of_all(kind, of_joint))
         if role == ANY:
             return located
         return tuple((k, path) for k, path in located if self._roles.get(log_and_joint(KINDS[k], path)[0]) == role)

@@ -280,10 +280,8 @@ def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
     """Reasons with their tasks; many reasons become one, which states the first."""
     if len(reasons) <= MAX_REASONS:
         return reasons
-    others = len(reasons) - 1
-    return {
-        f"{next(iter(reasons))}; {others} more such reasons": [name for names in reasons.values() for name in names]
-    }
+    every = [name for names in reasons.values() for name in names]
+    return {f"{next(iter(reasons))}; {len(reasons) - 1} more such reasons": every}
 
 
 def _listed(stage: str, tasks: list[str]) -> str:

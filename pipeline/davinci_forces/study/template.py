@@ -263,9 +263,8 @@ class _Writer:
     def why_empty(self) -> str:
         """Why nothing in the log can be used."""
         names = [channel.name for channel in self.draft.log.channels if not channel.derived]
-        return f"no position and effort of a joint, and no depth and force, among {', '.join(names[:8])}" + (
-            " ..." if len(names) > 8 else ""
-        )
+        some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+        return f"no position and effort of a joint, and no depth and force, among {some}"
 
     def row(self) -> Row:
         """The log in the table: its role, its rate, its joints, and what to look at first."""
@@ -439,9 +438,8 @@ def _touch_line(channel: Channel, quantity: str, in_millimetres: bool) -> str:
     if in_millimetres:
         return f'{quantity} = {{ channel = {_text(channel.name)}, unit = "mm" }}  # unit by the size of its values'
     where = "" if channel.unit else "  # unit by its name" if unit else "  # the log gives no unit: CHECK THIS"
-    return (
-        f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit or SI[OF_THE_LOG[quantity]])} }}{where}"
-    )
+    unit = unit or SI[OF_THE_LOG[quantity]]
+    return f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit)} }}{where}"
 
 
 def _text(value: str) -> str:

@@ -176,9 +176,8 @@ class Part(mmap):
 
 def is_scaled(properties: dict[str, Any]) -> bool:
     """Whether the values still have to be scaled by the properties."""
-    return properties.get("NI_Scaling_Status", "unscaled") != "scaled" and (
-        properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
-    )
+    has_scale = properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
+    return has_scale and properties.get("NI_Scaling_Status", "unscaled") != "scaled"
 
 
 def problem(properties: dict[str, Any]) -> str:

@@ -129,14 +129,12 @@ class _Reading:
             return None
         if dialect.delimiter == " ":
             block = b"\n".join(b" ".join(row.split()) for row in block.split(b"\n"))
-        delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), self.width
+        form = self.width, dialect.delimiter.encode(), dialect.decimal.encode()
         try:
-            cells = parse(
-                block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times, missing=missing
-            )
+            cells = parse(block, *form, self.wanted, quoted=dialect.quoted, times=self.times, missing=missing)
         except UNREADABLE:
             return None
-        return None if dialect.has_trailing and cells.nulls[width - 1] < cells.rows else cells
+        return None if dialect.has_trailing and cells.nulls[self.width - 1] < cells.rows else cells
 
     def _row_by_row(self, first: int, block: bytes) -> Cells:
         """Parse any other block: keep only the wanted cells, and locate a cell that is not a number."""
@@ -150,9 +148,8 @@ class _Reading:
                     lines.append(line)
         by_column = {i: [row[i] for row in rows] for i in self.wanted}
         nulls = {i: sum(cell in ABSENT for cell in cells) for i, cells in by_column.items()}
-        return Cells(
-            len(rows), {i: self._converted(i, lines, cells) for i, cells in by_column.items()}, nulls, texts=[]
-        )
+        columns = {i: self._converted(i, lines, cells) for i, cells in by_column.items()}
+        return Cells(len(rows), columns, nulls, texts=[])
 
     def _converted(self, column: int, lines: Sequence[int], cells: Sequence[str]) -> Array:
         """Convert the cells of a column, which stand in these lines, to numbers."""

@@ -15,6 +15,7 @@ from davinci_forces.maths.units import SI, UNITS, canonical, measures, size, uni
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
+from davinci_forces.study.channels import ALTERNATIVES
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
 MAX_VALUE = 1e30  # of a sample in the unit of its channel; no quantity of an arm is larger, nor are times in ns
@@ -137,9 +138,7 @@ class Intake:
         selected = t - first >= self.entry.skip - 1e-9
         for name in self.entry.joints:
             joint = self.robot.joint(name)
-            q, dq, tau = (
-                self.of_joint(block, joint, either) for either in (("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i"))
-            )
+            q, tau, dq = (self.of_joint(block, joint, either) for either, _ in ALTERNATIVES)
             assert q is not None
             assert tau is not None
             yield Recording(
