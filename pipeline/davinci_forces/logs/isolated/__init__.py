@@ -11,7 +11,7 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog, install
 from davinci_forces.files import require_file
-from davinci_forces.logs.isolated.process import Answer, ChildEnded, Message, child
+from davinci_forces.logs.isolated.process import Answer, ChildEnded, Message, answers
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
 
 SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
@@ -90,13 +90,12 @@ def _size(path: Path) -> int:
 def _answers(path: Path, request: Message) -> Iterator[Answer]:
     problem = ""
     try:
-        with child() as reading:
-            for message, columns in reading.answers(request):
-                if "bad" in message:
-                    # Read to the end, so that the child can be used again; closing the generator would end it.
-                    problem = _problem(path, request, message)
-                    continue
-                yield message, columns
+        for message, columns in answers(request):
+            if "bad" in message:
+                # Read to the end, so that the child can be used again; closing the generator would end it.
+                problem = _problem(path, request, message)
+                continue
+            yield message, columns
     except ChildEnded as why:
         raise BadLog(f"{path}: reading it {why}, so it is not read: {REMEDY}") from None
     if problem:

@@ -108,13 +108,11 @@ class Child:
 _waiting: list[Child] = []
 
 
-@contextmanager
-def child() -> Iterator[Child]:
-    """Provide a child for one request, and keep it for the next one if it answered completely."""
-    taken = _taken()
-    whole = False
+def answers(request: Message) -> Iterator[Answer]:
+    """Have a child answer a request, and keep it for the next one if it answered completely; raises as `Child` does."""
+    taken, whole = _taken(), False
     try:
-        yield taken
+        yield from taken.answers(request)
         whole = True
     finally:
         if whole and len(_waiting) < MAX_WAITING:
