@@ -40,16 +40,10 @@ Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.
 
 
 def identify(
-    robot: str | Path | Robot,
-    t: Samples,
-    q: Samples,
-    tau: Samples,
-    *,
-    period: float | Sequence[float] | None = None,
-    dq: Samples = None,
-    joints: str | Sequence[str] | None = None,
-    settings: Mapping[str, Any] | None = None,
-) -> "IdentifiedArm":
+    robot: str | Path | Robot, t: Samples, q: Samples, tau: Samples, *,
+    period: float | Sequence[float] | None = None, dq: Samples = None,
+    joints: str | Sequence[str] | None = None, settings: Mapping[str, Any] | None = None,
+) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
     table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
     arm = robot if isinstance(robot, Robot) else robots.load(Path(robot).name, Path(robot).parent)
@@ -127,13 +121,9 @@ class IdentifiedArm:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        settings: Settings,
-        joints: Sequence[str],
-        logs: Sequence[Columns],
+        self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
         periods: Sequence[float | None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.robot, self.joints = robot, tuple(joints)
         home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)

@@ -92,14 +92,9 @@ class TomlTable:
         self.file.note(self.file.line((*self.path, *keys)), f"{self.place}: {text}" if self.place else text)
 
     def number(
-        self,
-        key: str,
-        default: float | None = None,
-        low: float = -math.inf,
-        above: float = -math.inf,
-        expected: str = "a number",
-        kind: str = "",
-    ) -> float:
+        self, key: str, default: float | None = None, low: float = -math.inf, above: float = -math.inf,
+        expected: str = "a number", kind: str = "",
+    ) -> float:  # fmt: skip
         """A finite number, at least `low` and greater than `above`, and of a likely size for its key or `kind`."""
         value = self.take(key, default, (int, float), expected)
         if value is None:
@@ -194,13 +189,9 @@ class TomlTable:
             taken.add(value)
 
     def take(
-        self,
-        key: str,
-        default: Any,
-        kinds: tuple[type, ...],
-        expected: str,
+        self, key: str, default: Any, kinds: tuple[type, ...], expected: str,
         good: Callable[[Any], object] = lambda value: True,
-    ) -> Any:
+    ) -> Any:  # fmt: skip
         """The value of a key if it has one of these kinds and is `good`, as `expected` says; otherwise the default."""
         if key not in self:
             if default is None:

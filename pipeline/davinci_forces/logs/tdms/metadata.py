@@ -51,22 +51,19 @@ class Objects:
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
         """Add the metadata of one file segment; raises Damaged if it is truncated, or cannot be parsed."""
         take = _Cursor(metadata, order)
+        self.active = {} if renew else dict(self.active)
         try:
-            self._update(take, renew)
+            for _ in range(take.number("I")):
+                path = take.text()
+                properties = self.properties.setdefault(path, {})
+                self._index(path, take.number("I"), take)
+                for _ in range(take.number("I")):
+                    name, value = take.text(), take.value(take.number("I"))
+                    if properties.get(name) not in (None, "", value):
+                        self.revised.setdefault(path, {}).setdefault(name, properties[name])
+                    properties[name] = value
         except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
             raise Damaged(f"its metadata cannot be parsed after {take.at} bytes ({error})") from None
-
-    def _update(self, take: "_Cursor", renew: bool) -> None:
-        self.active = {} if renew else dict(self.active)
-        for _ in range(take.number("I")):
-            path = take.text()
-            properties = self.properties.setdefault(path, {})
-            self._index(path, take.number("I"), take)
-            for _ in range(take.number("I")):
-                name, value = take.text(), take.value(take.number("I"))
-                if properties.get(name) not in (None, "", value):
-                    self.revised.setdefault(path, {}).setdefault(name, properties[name])
-                properties[name] = value
 
     def _index(self, path: str, header: int, take: "_Cursor") -> None:
         if header == NO_DATA:
