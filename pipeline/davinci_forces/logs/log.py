@@ -36,6 +36,10 @@ BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
 
+class BadContent(ValueError):
+    """Content that is not as its format says, or not clear; the message omits the file, and perhaps the place."""
+
+
 @dataclass(frozen=True)
 class Options:
     """How to read a file, as a study states it; None is detected from the file."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.lines import MARKS, Lines
-from davinci_forces.logs.log import Channel, Clock, Log, Options, unique
-from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, BadHeader, Layout, X
+from davinci_forces.logs.log import BadContent, Channel, Clock, Log, Options, unique
+from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, Layout, X
 from davinci_forces.logs.lvm.rows import LvmLog, Reading
 from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.timeline import OwnClock, equal_columns
@@ -32,7 +32,7 @@ def read(path: Path, options: Options) -> Log:
             for _ in walk.runs(block, Run.looks_whole):
                 pass
         walk.finish()
-    except BadHeader as problem:
+    except BadContent as problem:
         raise BadLog(f"{path}:{walk.line}: {problem}") from None
     return _opened(path, options, walk)
 

@@ -10,8 +10,8 @@ import numpy as np
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
 from davinci_forces.logs.lines import Lines, decode
-from davinci_forces.logs.log import Block, Log, Options, read_ahead
-from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescape
+from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
+from davinci_forces.logs.lvm.header import Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import OwnClock
@@ -68,7 +68,7 @@ class Reading:
                 for run, cells in self.walk.runs(block, self._at_once):
                     yield self._block(run, cells or self._carefully(run))
             self.walk.finish()
-        except BadHeader as problem:
+        except BadContent as problem:
             raise BadLog(f"{self.log.path}:{self.walk.line}: {problem}") from None
         self._close()
 

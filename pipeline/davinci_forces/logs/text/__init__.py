@@ -12,10 +12,10 @@ import pyarrow as pa
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, parse
 from davinci_forces.logs.lines import GZIP, Lines, decode
-from davinci_forces.logs.log import Block, Log, Options, read_ahead
+from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, Unclear, both_readings, number_in, split_cells
+from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, both_readings, number_in, split_cells
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 from davinci_forces.maths.arrays import Array
 
@@ -35,7 +35,7 @@ def read(path: Path, options: Options) -> Log:
     head = decode(lines.head(), lines.encoding if not lines.mark else None).split("\n")
     try:
         dialect = find_dialect([line.rstrip("\r") for line in head], options)
-    except Unclear as problem:
+    except BadContent as problem:
         raise BadLog(f"{path}: {problem}") from None
     facts = {
         "delimiter": NAMES.get(dialect.delimiter, dialect.delimiter),

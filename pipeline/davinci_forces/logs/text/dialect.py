@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.logs.cells import MISSING
-from davinci_forces.logs.log import Channel, Options, renaming_remarks, unique
+from davinci_forces.logs.log import BadContent, Channel, Options, renaming_remarks, unique
 from davinci_forces.logs.text.marks import find_marks
-from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclear, both_readings, split_cells
+from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, both_readings, split_cells
 from davinci_forces.logs.text.stamps import Stamps, both_dates, stamps_of
 from davinci_forces.maths.units import UNSIZED, canonical, measures, since_1970, split_ratio, unit_in
 
@@ -63,13 +63,13 @@ class Header(NamedTuple):
 
 
 def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
-    """Find the format of a file from its first lines; raises Unclear if marks or columns have two readings."""
+    """Find the format of a file from its first lines; raises BadContent if marks or columns have two readings."""
     lines = _unfolded(lines[:SAMPLE_LINES])
     if lines and (separator := SEPARATOR_LINE.fullmatch(lines[0])):
         options, lines = replace(options, delimiter=options.delimiter or separator[1]), ["", *lines[1:]]
     rows = [line for line in lines if line.strip()]
     if not rows:
-        raise Unclear("it holds no rows; record it again, or take it out of study.toml")
+        raise BadContent("it holds no rows; record it again, or take it out of study.toml")
     body = _body(rows)
     delimiter, decimal = find_marks(rows, body, options)
     framed = delimiter == "|" and any(map(FRAME.search, body))
@@ -149,7 +149,7 @@ def _first_row(
         dated = all(cells[column][:1].isdecimal() for column in stamps if column < len(cells) and cells[column])
         if len(cells) == len(kinds) and dated and (measured or stamps) and all(map(number.fullmatch, measured)):
             return i
-    raise Unclear("none of its lines is a row of numbers; set `delimiter` and `decimal` for this log in study.toml")
+    raise BadContent("none of its lines is a row of numbers; set `delimiter` and `decimal` for this log in study.toml")
 
 
 def _are_numbers_of_columns(cells: Sequence[str], columns: Sequence[Sequence[str]], decimal: str) -> bool:
@@ -203,7 +203,7 @@ def _why_text(cells: Sequence[str]) -> str:
 def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options) -> Header:
     """Read the lines before the first row; `columns` are the cells of the columns below.
 
-    Raises Unclear if the last line has other columns than the rows, or holds numbers and text.
+    Raises BadContent if the last line has other columns than the rows, or holds numbers and text.
     """
     width = len(columns)
     rows = [_fitted(line, columns, delimiter) for line in lines]
@@ -213,14 +213,14 @@ def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimite
     free = bool(fits) and delimiter == " "  # blanks also separate the words of a remark
     odd = next((rows[i] for i in below if len(rows[i]) > 1 and (not free or _are_units(rows[i]))), None)
     if odd or (below and options.header and not fits):
-        raise Unclear(_other_columns(odd or rows[-1], width))
+        raise BadContent(_other_columns(odd or rows[-1], width))
     of_units = next((i for i in fits[::-1] if len(fits) > 1 and _are_units(rows[i])), None)
     above = [i for i in fits if of_units is None or i < of_units] or [i for i in fits if i != of_units]
     distinct = (i for i in above[::-1] if len({*filter(None, rows[i])}) == len([*filter(None, rows[i])]))
     of_names = next(distinct, above[-1] if above else None)  # a row of types repeats itself
     names = [] if of_names is None else rows[of_names]
     if any(COUNTING.fullmatch(cell) for cell in names) and options.header is None:
-        raise Unclear(
+        raise BadContent(
             f"a line before the rows holds numbers and text ({', '.join(names[:6])}); correct the cell, or set "
             "`header = true` for this log in study.toml if these are names"
         )
