@@ -105,8 +105,8 @@ class TdmsLog(Log):
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
         path_of = {name: path for path, name in self.names.items()}
         paths = [path_of[name] for name in dict.fromkeys(asked_for)]
-        plain, scaled = ([path for path in paths if (path in self.scaled) is is_scaled] for is_scaled in (False, True))
-        groups = [*self.index.groups(plain), *self.index.groups(scaled)]
+        plain = self.index.groups([path for path in paths if path not in self.scaled])
+        groups = plain + self.index.groups([path for path in paths if path in self.scaled])
         with open_file(self.path) as file:
             sources = [self._source(file, group) for group in groups]
             for block, lacking in side_by_side(sources, groups, rows_of(len(paths))):
