@@ -124,12 +124,13 @@ class Runner:
         """Remove the outputs of steps and kinds of record that no longer exist, and those that these steps made from
         logs that have left the study.
         """
-        folders = {"", *(kind.folder() for kind in KINDS.values())}
+        folders = {kind.folder() for kind in KINDS.values()}
         all_steps = {*every_step(), REPORT}
         obsolete = [
             entry
             for entry in self.ledger.entries()
-            if entry.stage not in all_steps or not {_folder(name) for name in entry.outputs} <= folders
+            if entry.stage not in all_steps
+            or not {name.split("/")[1] for name in entry.outputs if name.startswith("processed/")} <= folders
         ]
         for entry in obsolete:
             self.ledger.remove(entry)
@@ -264,12 +265,6 @@ def _has_tasks(part: Part) -> bool:
 def _part(step: str, task: str) -> Part:
     """The part of a step that the task of this name belongs to."""
     return Part(step, ALL_LOGS if step == REPORT else log_of(declaration(step), task))
-
-
-def _folder(name: str) -> str:
-    """The folder of a record's file; "" for any other file."""
-    root, _, place = name.partition("/")
-    return place.partition("/")[0] if root == "processed" else ""
 
 
 def _brief(reasons: list[str]) -> str:

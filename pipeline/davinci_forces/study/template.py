@@ -208,16 +208,13 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
     """Take efforts as currents in all logs without names that have as many channels as one that holds currents."""
     widths = {len(d.log.channels) for d in drawn if "i" in d.guess.symbols()}
-    return [_as_currents(draft) if len(draft.log.channels) in widths else draft for draft in drawn]
-
-
-def _as_currents(drawn: DraftLog) -> DraftLog:
-    meanings = {
-        name: replace(meaning, symbol="i", reason="CHECK: current, as in another log of as many channels")
-        if meaning.symbol == "tau" and meaning.reason.startswith("CHECK") else meaning
-        for name, meaning in drawn.guess.meanings.items()
-    }  # fmt: skip
-    return replace(drawn, guess=replace(drawn.guess, meanings=meanings))
+    reason = "CHECK: current, as in another log of as many channels"
+    for i, draft in enumerate(drawn):
+        meanings = draft.guess.meanings if len(draft.log.channels) in widths else {}
+        unclear = {n: m for n, m in meanings.items() if m.symbol == "tau" and m.reason.startswith("CHECK")}
+        currents = {name: replace(meaning, symbol="i", reason=reason) for name, meaning in unclear.items()}
+        drawn[i] = replace(draft, guess=replace(draft.guess, meanings=draft.guess.meanings | currents))
+    return drawn
 
 
 @dataclass(frozen=True)

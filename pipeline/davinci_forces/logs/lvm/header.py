@@ -94,7 +94,8 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
     """Parse the header and the column line of a file segment; raises BadContent without names, or if x is no time."""
     separator = file.separator.decode()
-    tags = _tags(lines, separator, encoding)
+    rows = [decode(text, encoding).split(separator) for text in lines]
+    tags = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)
     measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
     _check(tags, len(measured), line, remarks)
@@ -105,7 +106,9 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     x_unit = _first(tags, "X_Unit_Label") or "s"
     units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
-    start, started = _started(tags, file)
+    start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
+    if not started:
+        start, started = _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
     sampled = [i for i in measured if _cell(tags, "Samples", i) != "0"]  # without samples the other cells mean nothing
     written = _first(tags, "Delta_X")
     notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
@@ -128,16 +131,6 @@ def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
     """Return the cell of a tag for one column of a row, or ""."""
     cells = tags.get(tag, [])
     return cells[column - 1] if 0 < column <= len(cells) else ""
-
-
-def _tags(lines: Sequence[bytes], separator: str, encoding: str | None) -> dict[str, list[str]]:
-    rows = [decode(text, encoding).split(separator) for text in lines]
-    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
-
-
-def _started(tags: dict[str, list[str]], file: FileHeader) -> tuple[Decimal | None, str]:
-    start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
-    return (start, started) if started else _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
 
 
 def unescape(comment: bytes, encoding: str | None) -> str:
