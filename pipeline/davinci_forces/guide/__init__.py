@@ -121,7 +121,8 @@ def body(page: Page) -> str:
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = parser.parse(LINK.sub(_within, page.text))
+    text = LINK.sub(lambda link: f"[{link[1]}](#{link[2]}{f'--{link[3]}' if link[3] else ''})", page.text)
+    tokens = parser.parse(text)
     for i, token in enumerate(tokens):
         if token.type in ("heading_open", "heading_close"):
             token.tag = f"h{int(token.tag[1]) + 1}"
@@ -137,11 +138,6 @@ def body(page: Page) -> str:
 def slug(heading: str) -> str:
     """The name of a heading in links: lower case, with `-` for blanks and without signs."""
     return re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", heading.lower()).strip())
-
-
-def _within(link: re.Match[str]) -> str:
-    """A link to a page as a link to its place in the file."""
-    return f"[{link[1]}](#{link[2]}{f'--{link[3]}' if link[3] else ''})"
 
 
 def _address(page: Page, source: str) -> str:

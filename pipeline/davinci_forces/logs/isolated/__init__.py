@@ -71,20 +71,16 @@ class IsolatedLog(Log):
 
 
 def _request(path: Path, reader: str) -> Message:
-    size = _size(path)
+    """Ask for a log, or a bag of the files right in a folder; refuses what is not a file, which libraries do not."""
+    files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
+    for file in files:
+        require_file(file)
+    size = sum(file.stat().st_size for file in files)
     return {
         "reader": reader, "path": str(path.absolute()), "names": None, "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
         "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
     }  # fmt: skip
-
-
-def _size(path: Path) -> int:
-    """Sum the bytes of a log, or of the files right in its folder, and refuse what is not a file; libraries do not."""
-    files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
-    for file in files:
-        require_file(file)
-    return sum(file.stat().st_size for file in files)
 
 
 def _answers(path: Path, request: Message) -> Iterator[Answer]:
