@@ -42,7 +42,8 @@ class Rosbag1(Scan):
             elif kind == CHUNK:
                 self._scan_chunk(fields, content[begin:end], end <= len(content))
             elif kind == CHUNK_INFO:
-                self._state(fields, content[begin:end])
+                stated = Counter(dict(struct.iter_unpack("<II", content[begin:end])))
+                self.stated[int.from_bytes(fields[b"chunk_pos"], "little")] = stated
             elif kind in (CONNECTION, MESSAGE):
                 self.listed += kind == CONNECTION
                 self._take(kind, fields, content, begin, end)
@@ -106,9 +107,6 @@ class Rosbag1(Scan):
         definition = MessageDefinition(MessageDefinitionFormat.MSG, about[b"message_definition"].decode())
         kind_of = normalize_msgtype(about[b"type"].decode())
         self.add(Connection(connection, fields[b"topic"].decode(), kind_of, definition, "", 0, "ros1", self))
-
-    def _state(self, fields: Fields, content: memoryview) -> None:
-        self.stated[int.from_bytes(fields[b"chunk_pos"], "little")] = Counter(dict(struct.iter_unpack("<II", content)))
 
 
 def _fields(header: bytes) -> Fields:
