@@ -4,11 +4,10 @@ from pathlib import Path
 
 from davinci_forces.records import Diagnostic, Record
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprint import Fingerprint
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
-from davinci_forces.runner.places import is_about_log
-from davinci_forces.runner.plan import Plan
+from davinci_forces.runner.plan import Plan, is_about_log
 from davinci_forces.runner.signature import declaration
 from davinci_forces.study import LogEntry, Settings, Study
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import pytest
 
 from davinci_forces.maths.compiled import SOURCES
-from davinci_forces.runner.fingerprints.code import code
+from davinci_forces.runner.fingerprint import code
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "pipeline/davinci_forces"

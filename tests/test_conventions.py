@@ -250,7 +250,6 @@ OPENING = {
 OPENS = {  # a module that opens files otherwise than through `files`, and why it may
     "files.py": "it is the door",
     "guide/__init__.py": "the package's own pages",
-    "guide/html.py": "the package's own pages",
     "cli.py": "the package's own code",
     "maths/compiled.py": "the package's own code",
     "runner/signature.py": "the package's own code",

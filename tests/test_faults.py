@@ -358,7 +358,7 @@ def test_a_run_that_is_stopped_while_a_child_reads_a_log_leaves_no_child(raw, be
 def reads_log(pid: int) -> bool:
     """Whether a process is one that reads a log for another."""
     with suppress(OSError):
-        return b"isolated.child" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        return b"isolated.process" in Path(f"/proc/{pid}/cmdline").read_bytes()
     return False
 
 

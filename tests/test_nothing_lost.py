@@ -11,7 +11,7 @@ import pytest
 
 from davinci_forces.files import PARTIAL, leftovers
 from davinci_forces.runner import reporting
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
+from davinci_forces.runner.fingerprint import Fingerprint, hash_of_text
 from davinci_forces.runner.ledger import OUTPUT, Entry, Folders, Ledger, seal
 from davinci_forces.runner.plan import Task
 from tests.test_robustness import analysed, finished, flat, raw, small  # noqa: F401 - fixtures

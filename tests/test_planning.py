@@ -9,11 +9,10 @@ import pytest
 
 from davinci_forces.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, schemas
+from davinci_forces.runner.fingerprint import Fingerprint, schemas
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
-from davinci_forces.runner.places import log_and_joint
-from davinci_forces.runner.plan import Plan
+from davinci_forces.runner.plan import Plan, log_and_joint
 from davinci_forces.runner.signature import declaration
 from davinci_forces.study import LogEntry, Settings, Study
 from tests import many

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
+from davinci_forces.runner.fingerprint import Fingerprint, hash_of_text
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.plan import Task, reuse
 from davinci_forces.stages import design

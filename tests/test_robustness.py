@@ -22,8 +22,7 @@ from davinci_forces.errors import BadLog, BadRequest
 from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
 from davinci_forces.robots import davinci
 from davinci_forces.runner import execution
-from davinci_forces.runner.fingerprints.code import PACKAGE, code, find_imports
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, canonical, hash_of
+from davinci_forces.runner.fingerprint import PACKAGE, Fingerprint, canonical, code, find_imports, hash_of
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.lock import hold_lock, parse_holder
 from davinci_forces.runner.lock import holder as holder_now
@@ -226,7 +225,7 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
 HOLD = """
 import sys, time
 from pathlib import Path
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprint import Fingerprint
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.lock import hold_lock
 from davinci_forces.runner.plan import Task

@@ -18,7 +18,7 @@ from davinci_forces.robots.urdf import tables
 from davinci_forces.simulation.scenario import reading as scenarios
 from davinci_forces.study import reading as studies
 from davinci_forces.toml import TomlFile
-from davinci_forces.toml.ranges import KIND_OF, KINDS
+from davinci_forces.toml.table import KIND_OF, KINDS
 
 PACKAGE = Path(robots.__file__).parents[1]
 STUDY = """

@@ -13,7 +13,7 @@ from davinci_forces.errors import BadRobot, BadStudy
 from davinci_forces.maths.mechanics.kinematics import tip
 from davinci_forces.robots.from_toml import RESERVED
 from davinci_forces.robots.robot import Kind
-from davinci_forces.runner.fingerprints.fingerprint import hash_of
+from davinci_forces.runner.fingerprint import hash_of
 from davinci_forces.runner.reporting import study_files
 from davinci_forces.study import reading
 from davinci_forces.toml import TomlFile, TomlTable

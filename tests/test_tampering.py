@@ -17,7 +17,7 @@ import pytest
 from davinci_forces.errors import BadRecord, NotReproduced, PipelineError
 from davinci_forces.files import digest
 from davinci_forces.records import KINDS, store
-from davinci_forces.runner import recomputation, reporting, verification
+from davinci_forces.runner import reporting, verification
 from davinci_forces.runner.ledger import Folders, Ledger
 from tests.test_robustness import analysed, finished, flat  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, processed, reports
@@ -336,7 +336,7 @@ def test_a_recomputation_that_is_interrupted_leaves_nothing(finished, temporary,
 
     monkeypatch.setattr("davinci_forces.runner.runs.run", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        recomputation.recompute(ledger_of(finished).folders, by_bytes=True)
+        verification.recompute(ledger_of(finished).folders, by_bytes=True)
     assert not [*temporary.iterdir()]
 
 
@@ -376,13 +376,13 @@ def test_what_is_said_of_a_number_that_another_processor_computes(key, stored, c
         "gone": "are not computed from raw/",
         "other": "do not agree with raw/",
     }
-    assert [*recomputation.differences(key, stored, computed)] == [words[each] for each in said]
+    assert [*verification.differences(key, stored, computed)] == [words[each] for each in said]
     before, now = ({key: each} if each else {} for each in (stored, computed))
     if {*said} & {"new", "gone", "other"}:
         with pytest.raises(NotReproduced, match=f"1 {words[said[-1]]} \\({key}\\)"):
-            recomputation.compare_numbers(before, now)
+            verification.compare_numbers(before, now)
     else:
-        [line] = recomputation.compare_numbers(before, now)
+        [line] = verification.compare_numbers(before, now)
         assert all(f"1 {words[each]} ({key})" in line for each in said)
 
 
@@ -391,14 +391,14 @@ def test_an_entry_knows_the_packages_and_the_processor_that_it_was_made_with(fin
     reporting.environment.cache_clear()
     here = reporting.environment()
     assert {entry.environment for entry in ledger.entries()} == {here}
-    assert recomputation.has_same_environment(ledger.folders)
+    assert verification.has_same_environment(ledger.folders)
     others = ("importlib.metadata.version", "platform.python_version", "platform.machine")
     for changed in (*others, "davinci_forces.runner.processes.arithmetic.description"):
         with monkeypatch.context() as patched:
             patched.setattr(changed, lambda *_: "another")
             reporting.environment.cache_clear()
             assert reporting.environment() != here, changed
-            assert not recomputation.has_same_environment(ledger.folders)
+            assert not verification.has_same_environment(ledger.folders)
     reporting.environment.cache_clear()
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from davinci_forces.runner.fingerprints.code import package_fingerprint
+from davinci_forces.runner.fingerprint import package_fingerprint
 from tests.conftest import ROOT
 
 Run = Callable[..., str]
@@ -95,7 +95,7 @@ def test_a_pipeline_of_the_user_s_hides_nothing_and_is_not_hidden(installed, tmp
 
 @pytest.mark.medium
 def test_the_code_of_a_wheel_has_the_fingerprint_of_the_checkout(installed, tmp_path):
-    code = "from davinci_forces.runner.fingerprints.code import package_fingerprint; print(package_fingerprint())"
+    code = "from davinci_forces.runner.fingerprint import package_fingerprint; print(package_fingerprint())"
     assert run(next(installed.glob("python*")), "-c", code, cwd=tmp_path).strip() == package_fingerprint()
     assert re.fullmatch("[0-9a-f]{12}", package_fingerprint())
 

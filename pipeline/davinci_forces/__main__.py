@@ -1,4 +1,4 @@
-"""`python -m pipeline` is the same as `davinci-forces`."""
+"""`python -m davinci_forces` is the same as `davinci-forces`."""
 
 from davinci_forces.cli import main
 

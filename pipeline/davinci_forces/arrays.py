@@ -18,17 +18,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.arrays import Array
-from davinci_forces.records import (
-    AnyRecord,
-    Choice,
-    Contact,
-    Diagnostic,
-    ErrorBand,
-    Fit,
-    JointModel,
-    Track,
-    store,
-)
+from davinci_forces.records import AnyRecord, Choice, Contact, Diagnostic, ErrorBand, Fit, JointModel, Track, store
 from davinci_forces.report.content import Number
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
@@ -50,16 +40,10 @@ Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.
 
 
 def identify(
-    robot: str | Path | Robot,
-    t: Samples,
-    q: Samples,
-    tau: Samples,
-    *,
-    period: float | Sequence[float] | None = None,
-    dq: Samples = None,
-    joints: str | Sequence[str] | None = None,
-    settings: Mapping[str, Any] | None = None,
-) -> "IdentifiedArm":
+    robot: str | Path | Robot, t: Samples, q: Samples, tau: Samples, *,
+    period: float | Sequence[float] | None = None, dq: Samples = None,
+    joints: str | Sequence[str] | None = None, settings: Mapping[str, Any] | None = None,
+) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
     table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
     arm = robot if isinstance(robot, Robot) else robots.load(Path(robot).name, Path(robot).parent)
@@ -137,13 +121,9 @@ class IdentifiedArm:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        settings: Settings,
-        joints: Sequence[str],
-        logs: Sequence[Columns],
+        self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
         periods: Sequence[float | None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.robot, self.joints = robot, tuple(joints)
         home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
@@ -210,7 +190,7 @@ class IdentifiedArm:
 
     def plot(self) -> Any:
         """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
-        axes = axes_of(len(self.fits))
+        axes = axes_of({joint: self._effort_label(joint) for joint in self.fits})
         for ax, joint in zip(axes, self.fits, strict=True):
             shift = 0.0
             for i, model in enumerate(model for model in self.models if model.joint == joint):
@@ -218,10 +198,7 @@ class IdentifiedArm:
                 ax.plot(t, model.tau, "C0", lw=0.7, label="" if i else "measured")
                 ax.plot(t, model.tau_hat, "C1", lw=1.2, label="" if i else "model")
                 shift = t[-1]
-            ax.set_ylabel(self._effort_label(joint))
-            ax.set_title(joint, loc="left", fontsize="medium")
         axes[0].legend(loc="upper right")
-        axes[-1].set_xlabel("time [s]")
         return axes
 
     def __repr__(self) -> str:
@@ -313,16 +290,13 @@ class ExternalEffort:
 
     def plot(self) -> Any:
         """Plot the external effort with its 95 % band and the contacts; returns the axes, one a joint."""
-        axes = axes_of(len(self.record))
-        for ax, track, label in zip(axes, self.record, self.labels, strict=True):
+        axes = axes_of({t.joint: f"external {label}" for t, label in zip(self.record, self.labels, strict=True)})
+        for ax, track in zip(axes, self.record, strict=True):
             band = 1.96 * track.tau_ext_smooth_std
             ax.fill_between(track.t, track.tau_ext_smooth - band, track.tau_ext_smooth + band, color="C0", alpha=0.25)
             ax.plot(track.t, track.tau_ext_smooth, "C0", lw=1)
             for contact in self.contacts[self.contacts["joint"] == track.joint].itertuples():
                 ax.axvspan(contact.onset, contact.release, color="C1", alpha=0.2)
-            ax.set_ylabel(f"external {label}")
-            ax.set_title(track.joint, loc="left", fontsize="medium")
-        axes[-1].set_xlabel("time [s]")
         return axes
 
     def _repr_html_(self) -> str:
@@ -334,11 +308,16 @@ def by_joint(columns: Mapping[str, tuple[Array, Array]]) -> pd.DataFrame:
     return pd.DataFrame({joint: pd.Series(x, pd.Index(t, name="t")) for joint, (t, x) in columns.items()})
 
 
-def axes_of(joints: int) -> Any:
-    """One axes a joint (joints,), below each other."""
+def axes_of(labels: Mapping[str, str]) -> Any:
+    """One axes a joint (joints,), below each other, with the label of its effort."""
     from matplotlib import pyplot
 
-    _, axes = pyplot.subplots(joints, sharex=True, squeeze=False, figsize=(8, 0.8 + 2.0 * joints), layout="tight")
+    size = (8, 0.8 + 2.0 * len(labels))
+    _, axes = pyplot.subplots(len(labels), sharex=True, squeeze=False, figsize=size, layout="tight")
+    for ax, (joint, label) in zip(axes[:, 0], labels.items(), strict=True):
+        ax.set_ylabel(label)
+        ax.set_title(joint, loc="left", fontsize="medium")
+    axes[-1, 0].set_xlabel("time [s]")
     return axes[:, 0]
 
 

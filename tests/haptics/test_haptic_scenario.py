@@ -13,7 +13,7 @@ from davinci_forces.cli import app
 from davinci_forces.errors import BadStudy
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, BadHaptics, read
-from davinci_forces.runner.fingerprints.fingerprint import canonical
+from davinci_forces.runner.fingerprint import canonical
 from davinci_forces.study import HapticScenario, reading
 from tests import arm
 

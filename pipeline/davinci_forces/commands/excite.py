@@ -73,9 +73,8 @@ def run(
     of_arm = answered.arm.limits if answered.arm else None
     try:
         if csv:
-            csv.write_text(
-                trajectory.table(answered.trajectories, rate, run_in, of_arm), encoding="utf-8", newline="\n"
-            )
+            table = trajectory.table(answered.trajectories, rate, run_in, of_arm)
+            csv.write_text(table, encoding="utf-8", newline="\n")
         if plot:
             trajectory.plot(answered.trajectories, plot)
     except OSError as error:

@@ -26,8 +26,6 @@ def run(
             raise BadRequest("--out names the file that --html writes; add --html")
         show_markdown(page.as_text if page else guide.contents())
         return
-    from davinci_forces.guide.html import render
-
     file = out or DEFAULT_FILE
-    write_bytes(file, render().encode())
+    write_bytes(file, guide.as_html().encode())
     echo(f"see {file}{f'#{page.topic}' if page else ''}")

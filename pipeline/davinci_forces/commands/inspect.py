@@ -115,10 +115,8 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
         from davinci_forces.study.guessing import clock_hint
 
         hint = clock_hint(log.independent_copy())
-        advice = "none: unless study.toml names a channel of times, add rate = ... [Hz] there" + (
-            f", or {hint}" if hint else ""
-        )
-        return {"source": advice, "duplicates": clock.duplicates}
+        advice = "none: unless study.toml names a channel of times, add rate = ... [Hz] there"
+        return {"source": f"{advice}, or {hint}" if hint else advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
         "rate": _plain(clock.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),

@@ -109,39 +109,31 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     J_v, J_w = kinematics.jacobian(chain, pose)
     has_force = chain.n >= tip_force.ARM
     singular = has_force and bool(tip_force.is_singular(chain, pose))
+    frames = {name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
+              for name, t in zip(chain.names, T, strict=True)}  # fmt: skip
     return {
-        "frames": {
-            name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
-            for name, t in zip(chain.names, T, strict=True)
-        },
-        "tip": kinematics.tip(chain, pose).tolist(),
+        "frames": frames, "tip": kinematics.tip(chain, pose).tolist(),
         "remote_centre": kinematics.remote_centre(chain).tolist(),
-        "jacobian_v": J_v.tolist(),
-        "jacobian_w": J_w.tolist(),
-        **_dynamics(robot, pose, rates),
+        "jacobian_v": J_v.tolist(), "jacobian_w": J_w.tolist(), **_dynamics(robot, pose, rates),
         "condition": float(tip_force.condition(J_v[..., : tip_force.ARM])) if has_force and not singular else None,
-        "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
-        "joints": _joints(robot),
-    }
+        "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []), "joints": _joints(robot),
+    }  # fmt: skip
 
 
 def _joints(robot: "Robot") -> dict[str, Any]:
     """Kind, unit of effort, limits (null where there is none) and terms of each joint."""
-    return {
-        joint.name: {
-            "kind": joint.kind.value,
-            "effort": joint.unit("{effort}"),
-            "limits": {
-                **{
-                    symbol: [end if math.isfinite(end) else None for end in getattr(joint.limits, symbol)]
-                    for symbol in ("q", "dq", "ddq")
-                },
-                "effort": joint.limits.effort if math.isfinite(joint.limits.effort) else None,
-            },
-            "terms": [term.name for term in joint.terms],
-        }
-        for joint in robot.joints
-    }
+    joints = {}
+    for joint in robot.joints:
+        limits = {symbol: [*map(_finite, getattr(joint.limits, symbol))] for symbol in ("q", "dq", "ddq")}
+        joints[joint.name] = {
+            "kind": joint.kind.value, "effort": joint.unit("{effort}"),
+            "limits": limits | {"effort": _finite(joint.limits.effort)}, "terms": [term.name for term in joint.terms],
+        }  # fmt: skip
+    return joints
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:

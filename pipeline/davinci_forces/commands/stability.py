@@ -47,17 +47,20 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
     from davinci_forces.haptics.maths.bimodal import Hand
     from davinci_forces.toml import unlikely
 
-    above = {"--k-h": (k_h, "N/m"), "--b-h": (b_h, "N s/m"), "--m": (m, "kg"), "--rate": (rate, "Hz")}
+    options = {
+        "--k-h": (k_h, "N/m", "stiffness"), "--b-h": (b_h, "N s/m", "damping"), "--m": (m, "kg", "mass"),
+        "--delay": (delay, "s", "time"), "--rate": (rate, "Hz", "rate"),
+    }  # fmt: skip
     wrong = [
         f"{option} {value:g}: must be a positive number [{unit}]"
-        for option, (value, unit) in above.items()
-        if value is not None and not 0.0 < value < float("inf")
+        for option, (value, unit, _) in options.items()
+        if option != "--delay" and value is not None and not 0.0 < value < float("inf")
     ]
     if delay is not None and not 0.0 <= delay < float("inf"):
         wrong.append(f"--delay {delay:g}: must be 0 or a positive number [s]")
-    options = (("--k-h", k_h, "stiffness"), ("--b-h", b_h, "damping"), ("--m", m, "mass"), ("--delay", delay, "time"),
-               ("--rate", rate, "rate"))  # fmt: skip
-    wrong = wrong or [f"{text}, not {x:g}" for option, x, kind in options if (text := unlikely(option, x or 0.0, kind))]
+    if not wrong:
+        sizes = ((value, unlikely(option, value or 0.0, kind)) for option, (value, _, kind) in options.items())
+        wrong = [f"{text}, not {value:g}" for value, text in sizes if text]
     if wrong:
         without = "; a hand without damping never comes to rest" if b_h == 0.0 else ""
         raise BadRequest("; ".join(wrong) + without)
@@ -100,15 +103,9 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
         "k_t_switching": "below it, every switching is stable; above it, the worst switching is not",
         "k_t_delay": "below it, a hand that stays in contact is stable, with the delayed and held force",
     }
-    lines = [
-        f"Limits of the tissue stiffness K_T for a hand of m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and "
-        f"K_H = {hand.k:g} N/m:",
-        *(
-            f"  {key:13} {value:8.4g} N/m  {criteria[key]}"
-            for key, value in limits.items()
-            if value and key in criteria
-        ),
-    ]
+    of_hand = f"m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and K_H = {hand.k:g} N/m"
+    lines = [f"Limits of the tissue stiffness K_T for a hand of {of_hand}:"]
+    lines += [f"  {key:13} {limits[key]:8.4g} N/m  {text}" for key, text in criteria.items() if limits.get(key)]
     limit = limits.get("k_t_delay")
     if limit is None:
         return "\n".join([*lines, "", "These know no delay, which limits a real hand: add --delay or --rate."])

@@ -23,11 +23,11 @@ def run(
     jobs: Annotated[int, Option(min=1, help="Number of processes to recompute in.")] = 1,
 ) -> None:
     """Verify a study; every difference is an error, with exit code 1."""
-    from davinci_forces.runner import recomputation, runs, verification
+    from davinci_forces.runner import runs, verification
     from davinci_forces.study import reading
 
     folders = runs.folders(study, processed, reports)
-    pages = not again or recomputation.has_same_environment(folders)
+    pages = not again or verification.has_same_environment(folders)
     verified = verification.verify(reading.read(study), folders, "".join(report_id.split()).lower(), pages)
     echo(
         f"{study}: {verified.raw} raw, {verified.processed} processed and {verified.reports} report files are "
@@ -37,5 +37,5 @@ def run(
     if verified.unrelated:
         echo(f"{study}: not checked, since they are not part of the results: {', '.join(verified.unrelated)}")
     if again:
-        for line in recomputation.recompute(folders, pages, jobs):
+        for line in verification.recompute(folders, pages, jobs):
             echo(f"{study}: {line}")

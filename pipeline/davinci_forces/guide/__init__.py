@@ -1,5 +1,7 @@
 """The guide: pages of Markdown in folders by purpose, for the terminal and as one HTML file that needs no network."""
 
+import base64
+import hashlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,6 +24,7 @@ GROUPS = {  # folder -> its heading, in the order of the list
 INDEX, TERMS = "index", "terms"  # topics of the page that lists the others, and of that which explains terms
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.md(?:#([\w-]+))?\)")  # to a page, perhaps to a heading
 COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
+PICTURE = re.compile(r"[\w./-]+\.png")
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,7 @@ def pages() -> tuple[Page, ...]:
 def page(topic: str) -> Page:
     """The page of a topic, or what the page of terms says of a term.
 
-    Raises
-    ------
-    BadRequest
-        If there is neither; the message names the topics that hold these words, or are spelled most alike.
+    Raises BadRequest if there is neither; it names the topics that hold these words, or are spelled most alike.
     """
     by_topic = {page.topic: page for page in pages()}
     words = rf"(?<!\w){re.escape(topic)}s?(?!\w)"
@@ -81,19 +81,69 @@ def page(topic: str) -> Page:
     return by_topic[topic]
 
 
+def by_group() -> list[tuple[str, list[Page]]]:
+    """The heading of each group that has pages, with its pages."""
+    listed = [(heading, [page for page in pages() if page.folder == folder]) for folder, heading in GROUPS.items()]
+    return [(heading, members) for heading, members in listed if members]
+
+
 def contents() -> str:
     """The list of topics as Markdown, by group, each with its summary."""
-    lines = [
-        "# davinci-forces: the guide",
-        "",
-        "`davinci-forces guide TOPIC` shows a page, or explains a term of the report.",
-    ]
-    for folder, heading in GROUPS.items():
-        listed = [page for page in pages() if page.folder == folder]
-        lines += (
-            ["", f"## {heading}", "", *(f"- **{page.topic}**: {page.summary}" for page in listed)] if listed else []
-        )
+    about = "`davinci-forces guide TOPIC` shows a page, or explains a term of the report."
+    lines = ["# davinci-forces: the guide", "", about]
+    for heading, members in by_group():
+        lines += ["", f"## {heading}", "", *(f"- **{page.topic}**: {page.summary}" for page in members)]
     return "\n".join(lines)
+
+
+def as_html() -> str:
+    """The guide as one HTML file with a search that needs no network; the same pages give the same bytes."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    from davinci_forces.report.writers.html import TEMPLATES
+    from davinci_forces.report.writers.pictures import NAMES, looks
+
+    environment = Environment(
+        loader=FileSystemLoader([FOLDER, TEMPLATES]), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    script = (FOLDER / "search.js").read_text(encoding="utf-8")
+    hashed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    bodies = {page.topic: Markup(body(page)) for page in pages()}
+    return environment.get_template("page.html").render(
+        groups=by_group(), bodies=bodies, looks=looks(NAMES.values()), script=Markup(script), hash=f"sha256-{hashed}"
+    )
+
+
+def body(page: Page) -> str:
+    """One page as HTML, with headings a level lower, names of its headings, and links within the file."""
+    from markdown_it import MarkdownIt
+
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+    text = LINK.sub(lambda link: f"[{link[1]}](#{link[2]}{f'--{link[3]}' if link[3] else ''})", page.text)
+    tokens = parser.parse(text)
+    for i, token in enumerate(tokens):
+        if token.type in ("heading_open", "heading_close"):
+            token.tag = f"h{int(token.tag[1]) + 1}"
+        if token.type == "heading_open" and token.tag != "h2":
+            token.attrSet("id", f"{page.topic}--{slug(tokens[i + 1].content)}")
+        for child in token.children or ():
+            if child.type == "image":
+                child.attrSet("src", _address(page, str(child.attrGet("src"))))
+    html = str(parser.renderer.render(tokens, parser.options, {}))
+    return html.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
+
+
+def slug(heading: str) -> str:
+    """The name of a heading in links: lower case, with `-` for blanks and without signs."""
+    return re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", heading.lower()).strip())
+
+
+def _address(page: Page, source: str) -> str:
+    """The data URL of a picture beside a page."""
+    file = FOLDER / page.folder / source
+    return f"data:image/png;base64,{base64.b64encode(file.read_bytes()).decode()}" if PICTURE.fullmatch(source) else ""
 
 
 def _read(file: Path) -> Page:

@@ -70,16 +70,10 @@ def marks(block: bytes, delimiter: bytes) -> bytes:
 
 
 def parse(
-    block: bytes,
-    width: int,
-    delimiter: bytes,
-    decimal: bytes,
-    wanted: Sequence[int],
-    text: int = -1,
-    quoted: bool = False,
-    times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
+    block: bytes, width: int, delimiter: bytes, decimal: bytes, wanted: Sequence[int], text: int = -1,
+    quoted: bool = False, times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
     missing: Iterable[str] = (),
-) -> Cells:
+) -> Cells:  # fmt: skip
     """Convert the `wanted` columns of rows of `width` cells to numbers; column `text` is not converted.
 
     `times` converts those wanted columns that are not written as numbers.  Empty cells and the words `missing` are NaN.
@@ -92,14 +86,10 @@ def parse(
         read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PARSE_BYTES),
         parse_options=csv.ParseOptions(delimiter=delimiter.decode(), quote_char='"' if quoted else False),
         convert_options=csv.ConvertOptions(
-            column_types=types,
-            include_columns=list(types),
-            null_values=["", " ", *missing],
-            strings_can_be_null=bool(times),
-            decimal_point=decimal.decode(),
-            check_utf8=False,
+            column_types=types, include_columns=list(types), null_values=["", " ", *missing],
+            strings_can_be_null=bool(times), decimal_point=decimal.decode(), check_utf8=False,
         ),
-    )
+    )  # fmt: skip
     columns = {i: table.column(f"{i}") for i in wanted}
     return Cells(
         rows=table.num_rows,

@@ -15,7 +15,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import SAMPLED_KINDS, UNIT_OF_COUNTS, Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import SAMPLED_KINDS, UNIT_OF_COUNTS, Block, Channel, Log, Options, row_count, unique
 from davinci_forces.logs.parts import ABSOLUTE, require_different, starts_of
 from davinci_forces.logs.timeline import SKEW
 from davinci_forces.maths.arrays import Array, Booleans
@@ -104,7 +104,7 @@ class Joined(Log):
         inner = {name: name.removeprefix(f"{stem}/") for name in names if name not in self.counted}
         rows = 0
         for block in part.blocks(list(inner.values()) or [self.counted[names[0]]]):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             number = rows + np.arange(count, dtype=np.float64)
             yield {
                 name: self._since_start(stem, k, block[k]) if (k := inner.get(name)) else self._clock(stem, number)

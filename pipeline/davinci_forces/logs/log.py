@@ -36,6 +36,10 @@ BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
 
+class BadContent(ValueError):
+    """Content that is not as its format says, or not clear; the message omits the file, and perhaps the place."""
+
+
 @dataclass(frozen=True)
 class Options:
     """How to read a file, as a study states it; None is detected from the file."""
@@ -90,6 +94,7 @@ class Log:
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN of every channel read
     dropped: int = 0  # unusable rows
     cut: bool = False  # the file is truncated, so channels may end in missing samples
+    unread: dict[str, str] = field(default_factory=dict)  # by channel whose samples are not clear, why
     lent: dict[str, str] = field(default_factory=dict)  # by channel without a clock, the one whose clock it is given
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
     _indexed: tuple[tuple[Channel, ...], dict[str, Channel], set[str]] = field(
@@ -110,6 +115,10 @@ class Log:
         """Read the samples of channels of one clock that hold numbers or times."""
         raise NotImplementedError
 
+    def bad(self, problem: str) -> BadLog:
+        """The error of a problem of this log, which names its file."""
+        return BadLog(f"{self.path}: {problem}")
+
     def find(self, name: str | int) -> Channel:
         """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
 
@@ -118,20 +127,22 @@ class Log:
         if isinstance(name, int):
             written = [channel for channel in self.channels if not channel.derived]
             if not 0 <= name < len(written):
-                raise BadLog(f"{self.path}: there is no column {name}; its {len(written)} columns are counted from 0")
+                raise self.bad(f"there is no column {name}; its {len(written)} columns are counted from 0")
             return written[name]
-        exact = [channel for channel in self.channels if channel.name == name]
-        exact = exact or [channel for channel in self.channels if channel.alias == name]
+        by_name, _ = self._index()
+        if name in by_name:
+            return by_name[name]
+        exact = [channel for channel in self.channels if channel.alias == name]
         last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
         if len(exact or last) == 1:
             return (exact or last)[0]
         if last:
-            raise BadLog(f"{self.path}: {len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
+            raise self.bad(f"{len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
         names = [channel.name for channel in self.channels]
         close = get_close_matches(name, names, n=3, cutoff=0.5)
         near = [channel for channel in self.channels if channel.name in close]
         hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
-        raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
+        raise self.bad(f"there is no channel {name!r} among its {len(names)}; {hint}")
 
     def times_called(self, name: str | int) -> list[Channel]:
         """List the time channels that a study means by a name: one, or one of that name in each group of channels.
@@ -156,14 +167,10 @@ class Log:
         """Group names of channels by their clock: its time channel, or "" for the clock of the log."""
         _, clocks = self._index()
         grouped: dict[str, list[str]] = {}
-        for name, channel in zip(names, self._find_all(names), strict=True):
+        for name in names:
+            channel = self.find(name)
             grouped.setdefault(channel.name if channel.name in clocks else channel.time, []).append(name)
         return grouped
-
-    def _find_all(self, names: Sequence[str]) -> list[Channel]:
-        """Find many channels; a search for each would take the square of the time."""
-        by_name, _ = self._index()
-        return [by_name.get(name) or self.find(name) for name in names]
 
     def _index(self) -> tuple[dict[str, Channel], set[str]]:
         """Index the channels by name, and the names of clocks: once, as a log may have a clock for each channel."""
@@ -173,16 +180,18 @@ class Log:
         return self._indexed[1:]
 
     def _restart(self, names: Sequence[str]) -> None:
-        """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""
+        """Reset the counts before blocks are read, and refuse channels that do not hold numbers of one meaning."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
-        for name, channel in zip(names, self._find_all(names), strict=True):
-            if channel.kind not in SAMPLED_KINDS:
-                raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
+        if problem := next((self.unread[name] for name in names if name in self.unread), ""):
+            raise self.bad(problem)
+        for name in names:
+            if (kind := self.find(name).kind) not in SAMPLED_KINDS:
+                raise self.bad(f"channel {name!r} holds {kind}, not numbers; choose another")
         if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
-            raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
+            raise self.bad(f"{', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
     def count_nans(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
         """Count the NaNs of a block and return it: `missing` of each channel are missing, the others logged."""
@@ -226,7 +235,7 @@ def read_ahead(blocks: Iterator[Block]) -> Iterator[Block]:
     """
     gathered = _gathered(blocks)
     block = next(gathered, None)
-    if block and not _is_full(_rows(block), len(block)):
+    if block and not _is_full(row_count(block), len(block)):
         yield block
     elif block:
         with ThreadPoolExecutor(max_workers=1) as reader:
@@ -241,15 +250,16 @@ def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
     rows = 0
     for block in blocks:
         waiting.append(block)
-        rows += _rows(block)
+        rows += row_count(block)
         if _is_full(rows, len(block)):
-            yield _joined(waiting)
+            yield concatenate(waiting)
             waiting, rows = [], 0
     if rows:
-        yield _joined(waiting)
+        yield concatenate(waiting)
 
 
-def _rows(block: Block) -> int:
+def row_count(block: Block) -> int:
+    """The number of rows of a block."""
     return len(next(iter(block.values()), ()))
 
 
@@ -257,7 +267,8 @@ def _is_full(rows: int, channels: int) -> bool:
     return rows >= BLOCK_ROWS or rows * channels >= BLOCK_CELLS
 
 
-def _joined(blocks: Sequence[Block]) -> Block:
+def concatenate(blocks: Sequence[Block]) -> Block:
+    """Join consecutive blocks of the same channels."""
     if len(blocks) == 1:
         return blocks[0]
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}

@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, row_count, unique
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
@@ -56,7 +56,7 @@ class Parts(Log):
         self.parts = list(parts)
         for part in parts[1:]:
             if _written(part) != _written(first):
-                raise BadLog(f"{part.path}: its channels differ from those of {first.path}, so they are not one log")
+                raise part.bad(f"its channels differ from those of {first.path}, so they are not one log")
         self.facts = {"parts": ", ".join(part.path.name for part in parts), **first.facts}
         self.cut, self.lent = parts[-1].cut, first.lent
         self.starts = starts_of(parts)
@@ -77,9 +77,8 @@ class Parts(Log):
                 self.remarks.append(f"{after.path.name} started after {before.path.name}, and {REMARK}")
         shared = _partition(self.parts[0])
         if any(_partition(part).keys() != shared.keys() for part in self.parts):
-            raise BadLog(
-                f"{self.path}: the parts of this log do not have the same channels on one clock; give each as a "
-                "separate log"
+            raise self.bad(
+                "the parts of this log do not have the same channels on one clock; give each as a separate log"
             )
         written = [channel for channel in self.channels if not (channel.derived and channel.kind == "time")]
         names = [channel.name for channel in written]
@@ -129,7 +128,7 @@ class Parts(Log):
         others = [name for name in names if name != time]
         counted = [] if part_time or others else sorted(clock_channels)[:1]  # gives the number of samples
         for block in part.blocks([*others, *([part_time] if part_time else []), *counted]):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             t = axis.read(number, part, part_time, block[part_time]) if part_time else axis.count(number, part, count)
             yield {name: t if name == time else block[name] for name in names}
 
@@ -207,8 +206,8 @@ class _Axis:
             return t
         if number != self.part and number and t[0] <= self.last:
             before, part = self.parts[number - 1].path.name, self.parts[number]
-            raise BadLog(
-                f"{part.path}: it begins at {t[0]:.9g} s of the log, but {before} ends at {self.last:.9g} s; the parts "
+            raise part.bad(
+                f"it begins at {t[0]:.9g} s of the log, but {before} ends at {self.last:.9g} s; the parts "
                 "overlap, so they belong to different recordings, or a clock was wrong: give them as separate logs"
             )
         self.part, self.last = number, float(t[-1])

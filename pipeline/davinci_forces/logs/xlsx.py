@@ -141,7 +141,7 @@ class SheetLog(Log):
             return float(cell)
         except (TypeError, ValueError):
             text = f"{cell}"[:40]
-            raise BadLog(
-                f"{self.path}: sheet {self.sheet!r}, row {row + 1}, column {name!r}: {text!r} is not a number; "
+            raise self.bad(
+                f"sheet {self.sheet!r}, row {row + 1}, column {name!r}: {text!r} is not a number; "
                 "correct the cell, or empty it"
             ) from None

@@ -19,8 +19,7 @@ from davinci_forces.maths.arrays import BLOCK_SAMPLES
 from davinci_forces.records import KINDS, Diagnostic, Record, diagnostic
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
-from davinci_forces.runner.places import Located, is_about_log
-from davinci_forces.runner.plan import Task
+from davinci_forces.runner.plan import Located, Task, is_about_log
 from davinci_forces.runner.signature import declaration, function_of, stage_of
 from davinci_forces.study import LogEntry
 

@@ -4,12 +4,13 @@ waits for all of them.
 
 from collections.abc import Iterable, Sequence
 from functools import cache
+from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from itertools import takewhile
 from typing import NamedTuple
 
 from davinci_forces.report import REPORT
-from davinci_forces.runner.places import is_about_log
+from davinci_forces.runner.plan import is_about_log
 from davinci_forces.runner.signature import Declaration, declaration, stage_of, steps
 from davinci_forces.stages import GROUPS, STAGES
 
@@ -32,30 +33,23 @@ class Graph:
     def __init__(self, names: Sequence[str], logs: Sequence[str]) -> None:
         self.parts = [part for name in names for part in _parts(name, logs)]
         self._rank = {part: i for i, part in enumerate(self.parts)}
-        self._waits: dict[Part, int] = {}
-        self._followers: dict[Part, list[Part]] = {}
-        self._ready: list[tuple[int, Part]] = []
-        for part in self.parts:
-            sources = [source for source in dict.fromkeys(_sources(part, names, logs)) if source in self._rank]
-            self._waits[part] = len(sources)
-            for source in sources:
-                self._followers.setdefault(source, []).append(part)
-            if not sources:
-                heappush(self._ready, (self._rank[part], part))
+        of_run = self._rank.keys()
+        self._order = TopologicalSorter({part: of_run & _sources(part, names, logs) for part in self.parts})
+        self._order.prepare()
+        self._ready: list[int] = []
 
     def next(self) -> list[Part]:
         """Take the ready parts of one step; none if all parts have begun or wait for other parts."""
+        for part in self._order.get_ready():
+            heappush(self._ready, self._rank[part])
         batch: list[Part] = []
-        while self._ready and (not batch or self._ready[0][1].step == batch[0].step):
-            batch.append(heappop(self._ready)[1])
+        while self._ready and (not batch or self.parts[self._ready[0]].step == batch[0].step):
+            batch.append(self.parts[heappop(self._ready)])
         return batch
 
     def finish(self, part: Part) -> None:
         """Mark a part as done; parts that waited only for this part become ready."""
-        for follower in self._followers.get(part, ()):
-            self._waits[follower] -= 1
-            if not self._waits[follower]:
-                heappush(self._ready, (self._rank[follower], follower))
+        self._order.done(part)
 
 
 def stages_of(names: Iterable[str]) -> set[str]:

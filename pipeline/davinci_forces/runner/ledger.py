@@ -23,7 +23,7 @@ from typing import Any
 from davinci_forces.files import digest, read_bytes, write_bytes
 from davinci_forces.records import FORMER_FOLDERS, KINDS
 from davinci_forces.report import FILES
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences, hash_of_text
+from davinci_forces.runner.fingerprint import Fingerprint, differences, hash_of_text
 
 MAX_NAME_BYTES = 200  # in a file's name, which may have 255 bytes with all endings
 SEAL = ',\n "seal": "{}"\n}}\n'  # the end of an entry
@@ -228,8 +228,5 @@ def _read(file: str) -> Entry:
     content = text[: -len(SEAL.format("0" * 64))] + "\n}"
     if not text.endswith(SEAL.format(hash_of_text(content))):
         raise ValueError("it is not as a stage wrote it")
-    return check(
-        Entry(**json.loads(content)),
-        os.path.basename(os.path.dirname(file)),
-        os.path.basename(file).removesuffix(".json"),
-    )
+    stage, name = file.split(os.sep)[-2:]
+    return check(Entry(**json.loads(content)), stage, name.removesuffix(".json"))

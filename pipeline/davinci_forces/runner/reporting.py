@@ -14,11 +14,9 @@ from davinci_forces.records import KINDS, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, error_message, without_folders
-from davinci_forces.runner.fingerprints.code import code, package_fingerprint
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of
+from davinci_forces.runner.fingerprint import Fingerprint, code, hash_of, package_fingerprint
 from davinci_forces.runner.ledger import Ledger
-from davinci_forces.runner.places import Located
-from davinci_forces.runner.plan import Plan, Task
+from davinci_forces.runner.plan import Located, Plan, Task
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
@@ -35,15 +33,13 @@ def task(plan: Plan) -> Task:
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     reviewed = study.folder / review.FILE  # the page depends on it, the report ID does not
     review_hash = {"review": digest(reviewed)} if reviewed.is_file() else {}
+    hashes = code("davinci_forces.report.report", "davinci_forces.records.store")
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
         given={"study": hash_of(replace(study, folder=Path(study.name)))} | review_hash,
-        settings=asdict(study.settings),
-        schemas={},
-        code=code("davinci_forces.report.report", "davinci_forces.records.store")
-        | {"the whole package": package_fingerprint()},
+        settings=asdict(study.settings), schemas={}, code=hashes | {"the whole package": package_fingerprint()},
         version=__version__,
-    )
+    )  # fmt: skip
     return Task(REPORT, REPORT, fingerprint, {"records": located}, {"study": study})
 
 

@@ -124,12 +124,13 @@ class Runner:
         """Remove the outputs of steps and kinds of record that no longer exist, and those that these steps made from
         logs that have left the study.
         """
-        folders = {"", *(kind.folder() for kind in KINDS.values())}
+        folders = {kind.folder() for kind in KINDS.values()}
         all_steps = {*every_step(), REPORT}
         obsolete = [
             entry
             for entry in self.ledger.entries()
-            if entry.stage not in all_steps or not {_folder(name) for name in entry.outputs} <= folders
+            if entry.stage not in all_steps
+            or not {name.split("/")[1] for name in entry.outputs if name.startswith("processed/")} <= folders
         ]
         for entry in obsolete:
             self.ledger.remove(entry)
@@ -266,12 +267,6 @@ def _part(step: str, task: str) -> Part:
     return Part(step, ALL_LOGS if step == REPORT else log_of(declaration(step), task))
 
 
-def _folder(name: str) -> str:
-    """The folder of a record's file; "" for any other file."""
-    root, _, place = name.partition("/")
-    return place.partition("/")[0] if root == "processed" else ""
-
-
 def _brief(reasons: list[str]) -> str:
     return "; ".join(reasons[:2]) + (f"; and {len(reasons) - 2} more" if len(reasons) > 2 else "")
 
@@ -280,10 +275,8 @@ def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
     """Reasons with their tasks; many reasons become one, which states the first."""
     if len(reasons) <= MAX_REASONS:
         return reasons
-    others = len(reasons) - 1
-    return {
-        f"{next(iter(reasons))}; {others} more such reasons": [name for names in reasons.values() for name in names]
-    }
+    every = [name for names in reasons.values() for name in names]
+    return {f"{next(iter(reasons))}; {len(reasons) - 1} more such reasons": every}
 
 
 def _listed(stage: str, tasks: list[str]) -> str:

@@ -114,16 +114,9 @@ def load(folder: Path) -> Study:
 
 
 def run(
-    folder: Path,
-    names: Sequence[str],
-    processed: Path | None = None,
-    reports: Path | None = None,
-    force: bool = False,
-    jobs: int = 1,
-    verbosity: Verbosity = "normal",
-    dry_run: bool = False,
-    cluster: str = "",
-) -> bool:
+    folder: Path, names: Sequence[str], processed: Path | None = None, reports: Path | None = None,
+    force: bool = False, jobs: int = 1, verbosity: Verbosity = "normal", dry_run: bool = False, cluster: str = "",
+) -> bool:  # fmt: skip
     """Run stages of one study and the stages that they need, or preview the run; return whether all tasks succeeded."""
     study = load(folder)
     terminal = console(verbosity)

@@ -1,7 +1,7 @@
 """Read the [[log]] tables of a study file."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -69,27 +69,12 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
     name = _name(study, index, table)
     table.place = f"log {name!r}"
     entry = LogEntry(
-        name=name,
-        files=_files(table),
-        role=table.text("role", choices=ROLES),
-        channels=Channels(table, robot).read(),
-        join="join" in table,
-        period=optional_number(table, "period"),
-        rate=optional_number(table, "rate"),
-        skip=optional_number(table, "skip") or 0.0,
-        until=_end(table),
-        contact=_windows(table, "contact"),
-        free=_windows(table, "free"),
-        weight=_weight(table, robot),
-        tare=table.text("tare", ""),
-        options=Options(
-            delimiter=_delimiter(table),
-            decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
-            header=table.flag("header") if "header" in table else None,
-            encoding=table.text("encoding") if "encoding" in table else None,
-            **_binary(table),
-        ),
-    )
+        name, _files(table), table.text("role", choices=ROLES), Channels(table, robot).read(), "join" in table,
+        period=optional_number(table, "period"), rate=optional_number(table, "rate"),
+        skip=optional_number(table, "skip") or 0.0, until=_end(table),
+        contact=_windows(table, "contact"), free=_windows(table, "free"), weight=_weight(table, robot),
+        tare=table.text("tare", ""), options=_options(table),
+    )  # fmt: skip
     table.close()  # reports unknown keys
     return entry
 
@@ -134,25 +119,26 @@ def _end(table: TomlTable) -> float | None:
     return until
 
 
-def _delimiter(table: TomlTable) -> str | None:
+def _options(table: TomlTable) -> Options:
+    """Read how the files are read; type and columns are those of raw binary numbers, which have no header."""
     if table.values.get("delimiter") == "":
         table.problem("delimiter must not be empty; leave the key out, and it is detected from the file", "delimiter")
-    return table.text("delimiter") if "delimiter" in table else None
-
-
-def _binary(table: TomlTable) -> dict[str, Any]:
-    """Read the type and columns of a file of raw binary numbers, which has no header."""
     for key, other_key in (("dtype", "columns"), ("columns", "dtype")):
-        if key in table and other_key not in table:
+        if key in table.values and other_key not in table.values:
             table.problem(f"{key} needs {other_key}; a file of raw binary numbers takes {BINARY_EXAMPLE}", key)
-    fields: dict[str, Any] = {}
-    if "dtype" in table:
-        expected = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
-        fields["dtype"] = table.take("dtype", None, (str,), expected, lambda word: dtype_of(word) is not None)
-    if "columns" in table:
-        columns = table.take("columns", None, (int, list), "how many numbers a row has, or their names", _are_columns)
-        fields["columns"] = tuple(columns) if isinstance(columns, list) else columns
-    return fields
+    number = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
+    row = "how many numbers a row has, or their names"
+    readers: dict[str, Callable[[str], Any]] = {
+        "delimiter": table.text,
+        "decimal": lambda key: table.text(key, choices=(".", ",")),
+        "header": table.flag,
+        "encoding": table.text,
+        "dtype": lambda key: table.take(key, None, (str,), number, lambda word: dtype_of(word) is not None),
+        "columns": lambda key: table.take(key, None, (int, list), row, _are_columns),
+    }
+    stated = {key: read(key) for key, read in readers.items() if key in table}
+    columns = stated.get("columns")
+    return Options(**stated | {"columns": tuple(columns) if isinstance(columns, list) else columns})
 
 
 def _are_columns(value: object) -> bool:

@@ -78,11 +78,8 @@ class Holding:
     @property
     def is_complete(self) -> bool:
         """Whether a joint has a position and an effort."""
-        has = {(meaning.joint, meaning.symbol) for meaning in self.meanings.values()}
-        joints = {joint for joint, _ in has}
-        return any(
-            any((joint, s) in has for s in POSITIONS) and any((joint, s) in has for s in EFFORTS) for joint in joints
-        )
+        with_effort = {meaning.joint for meaning in self.meanings.values() if meaning.symbol in EFFORTS}
+        return not with_effort.isdisjoint(self.joints_of_ranges())
 
 
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
@@ -103,10 +100,8 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
         return content
     if any(robot.file and len(robot.joints) == content.joints for robot in robots):
-        check = {
-            n: replace(m, reason=f"CHECK: {m.reason.removeprefix('CHECK: ')}") for n, m in content.meanings.items()
-        }
-        return replace(content, meanings=check)
+        reasons = {name: f"CHECK: {m.reason.removeprefix('CHECK: ')}" for name, m in content.meanings.items()}
+        return replace(content, meanings={n: replace(m, reason=reasons[n]) for n, m in content.meanings.items()})
     times = [channel.name for channel in numbers if is_time(channel)]
     samples = {name: samples_of(log, [name])[name] for name in times}
     timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know

@@ -89,12 +89,10 @@ def joint_groups(channels: Sequence[Channel]) -> list[Numbered]:
         if keys and not is_time(channel):
             key = max(keys, key=lambda key: len(groups[key]))
             chosen.setdefault(key, {})[keys[key]] = channel.name
-    signals = [
-        Numbered(symbol_of(words), names, tuple(words)) for key, names in chosen.items() for words in [_words(key)]
-    ]
-    return sorted(
-        (group for group in signals if group.symbol), key=lambda group: bool(set(ROUGH_WORDS) & {*group.words})
-    )
+    words = {key: _words(key) for key in chosen}
+    signals = [Numbered(symbol_of(words[key]), names, tuple(words[key])) for key, names in chosen.items()]
+    known = [group for group in signals if group.symbol]
+    return sorted(known, key=lambda group: bool(set(ROUGH_WORDS) & {*group.words}))
 
 
 def _words(key: str) -> list[str]:

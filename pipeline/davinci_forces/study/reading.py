@@ -102,9 +102,8 @@ def _baseline(table: TomlTable, folder: Path) -> str:
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:
     """The robot, or None where its joints are unknown."""
-    name = table.take(
-        "robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
-    )
+    expected = f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
+    name = table.take("robot", None, (str,), expected)
     if name is None:
         return None
     if not is_inside(name):

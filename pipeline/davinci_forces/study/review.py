@@ -48,15 +48,9 @@ def _rating(table: TomlTable) -> Rating:
 
 
 def _content(subject: str, name: str, table: TomlTable) -> Rating:
-    rating = Rating(
-        subject,
-        name,
-        table.text("verdict", choices=VERDICTS),
-        table.text("comment", ""),
-        table.text("reviewer", ""),
-        table.text("date", ""),
-        table.text("results", ""),
-    )
+    verdict = table.text("verdict", choices=VERDICTS)
+    texts = [table.text(key, "") for key in ("comment", "reviewer", "date", "results")]
+    rating = Rating(subject, name, verdict, *texts)
     if not re.fullmatch(r"[0-9a-f]{64}", rating.results):
         table.problem(
             f"results must be the SHA-256 of the rated results.json, as the page exports it, not {rating.results!r}",

@@ -102,9 +102,8 @@ def _touched(holding: Holding) -> str:
     if holding.ranges and not holding.moving:
         return "no joint moves in it, so nothing can be identified from it"
     pushed = [str(joint + 1) for joint, course in holding.courses.items() if has_outliers(course)]
-    return (
-        f"{_check(holding)}the effort of joint {', '.join(pushed)} has outliers, as pushes make them" if pushed else ""
-    )
+    why = f"{_check(holding)}the effort of joint {', '.join(pushed)} has outliers, as pushes make them"
+    return why if pushed else ""
 
 
 def _check(holding: Holding) -> str:
@@ -130,20 +129,16 @@ def _by_motion(
     roles: dict[int, Role] = {}
     for i in fixed:
         _cover(reach, recordings[i])
+    holdings = [recording.holding for recording in recordings]
     excited = {i: _word(recordings[i].path)[0] == "excitation" for i in rest}
-    identifying = {i: recordings[i].holding.repeats or excited[i] for i in rest}
-    order = sorted(
-        rest, key=lambda i: (not recordings[i].holding.repeats, not excited[i], *_size(recordings[i].holding))
-    )
-    varied = {
-        joint for i in [*rest, *fixed] if not recordings[i].holding.steady for joint in recordings[i].holding.moving
-    }
+    identifying = {i: holdings[i].repeats or excited[i] for i in rest}
+    varied = {joint for i in [*rest, *fixed] if not holdings[i].steady for joint in holdings[i].moving}
     late: list[int] = []
-    moved = {joint for i in rest if recordings[i].holding.repeats for joint in recordings[i].holding.moving}
-    others = (recordings[i].holding for i in rest if not identifying[i])
+    moved = {joint for i in rest if holdings[i].repeats for joint in holdings[i].moving}
+    others = (holdings[i] for i in rest if not identifying[i])
     is_tested = any(tested) or any(moved <= set(other.moving) and not other.steady for other in others)
-    for i in order:
-        holding, spans = recordings[i].holding, _spans(recordings[i].holding)
+    for i in sorted(rest, key=lambda i: (not holdings[i].repeats, not excited[i], *_size(holdings[i]))):
+        holding, spans = holdings[i], _spans(holdings[i])
         within = next((reach[joint][1] for joint in spans if joint in reach), "")
         if holding.steady and not excited[i] and varied & set(holding.moving):
             roles[i] = Role("friction", "its joint moves at one constant velocity after another")
@@ -155,9 +150,8 @@ def _by_motion(
         elif holding.repeats:
             roles[i] = Role("validation", f"its motion stays within that of {within}, which identifies")
         else:
-            roles[i] = Role(
-                "validation", "its motion does not repeat" + (f", but that of {within} does" if within else "")
-            )
+            but = f", but that of {within} does" if within else ""
+            roles[i] = Role("validation", f"its motion does not repeat{but}")
     return roles | _not_repeating(recordings, late, reach, any(tested))
 
 
@@ -178,9 +172,8 @@ def _not_repeating(
 
 def _spans(holding: Holding) -> dict[int, float]:
     """The range of each joint that moves."""
-    return {joint: float(c.q.max() - c.q.min()) for joint, c in holding.courses.items()} or dict.fromkeys(
-        holding.moving, 1.0
-    )
+    spans = {joint: float(c.q.max() - c.q.min()) for joint, c in holding.courses.items()}
+    return spans or dict.fromkeys(holding.moving, 1.0)
 
 
 def _size(holding: Holding) -> tuple[float, float]:

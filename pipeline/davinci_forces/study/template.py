@@ -18,15 +18,8 @@ from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.tissue.palpation import touches_at_once
 from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.study.belonging import (
-    MAX_ANGLE_DRIVE,
-    Arm,
-    arm_of,
-    candidates,
-    group_recordings,
-    guess_joined,
-    split_signal,
-)
+from davinci_forces.study import belonging
+from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, force_sensor, is_tissue, tissue_channels, unit_of
 from davinci_forces.study.entries import ROLES, is_inside
 from davinci_forces.study.guessing import Holding, Meaning, guess
@@ -73,7 +66,7 @@ class DraftLog:
     def name(self) -> str:
         """The name of its first file, as a valid name of a log."""
         first = self.files[0]
-        name = split_signal(first)[0] if len(self.files) > 1 else first.name.partition(".")[0]
+        name = belonging.split_signal(first)[0] if len(self.files) > 1 else first.name.partition(".")[0]
         return re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-_") or "log"
 
 
@@ -114,14 +107,14 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
                 f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
             )
     stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
-    arms, why_not = (stated, []) if stated else candidates(folder)
-    drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
+    arms, why_not = (stated, []) if stated else belonging.candidates(folder)
+    drawn, refused = _read(belonging.group_recordings(files), [arm.robot for arm in arms])
     if not drawn:
         what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
     names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]
-    arm = stated[0] if stated else arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
+    arm = stated[0] if stated else belonging.arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
     drawn = _named_as(arm.robot, drawn)
     roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
     blocks, rows = [], []
@@ -151,7 +144,7 @@ def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[D
 def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     if len(files) > 1:
         joined = Joined([open_log(file) for file in files])
-        return DraftLog(files, joined, guess_joined(joined), {})
+        return DraftLog(files, joined, belonging.guess_joined(joined), {})
     log = open_log(files[0])
     holding = guess(log, listed)
     touching = tissue_channels([channel for channel in log.channels if not is_time(channel)])
@@ -215,16 +208,13 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
     """Take efforts as currents in all logs without names that have as many channels as one that holds currents."""
     widths = {len(d.log.channels) for d in drawn if "i" in d.guess.symbols()}
-    return [_as_currents(draft) if len(draft.log.channels) in widths else draft for draft in drawn]
-
-
-def _as_currents(drawn: DraftLog) -> DraftLog:
-    meanings = {
-        name: replace(meaning, symbol="i", reason="CHECK: current, as in another log of as many channels")
-        if meaning.symbol == "tau" and meaning.reason.startswith("CHECK") else meaning
-        for name, meaning in drawn.guess.meanings.items()
-    }  # fmt: skip
-    return replace(drawn, guess=replace(drawn.guess, meanings=meanings))
+    reason = "CHECK: current, as in another log of as many channels"
+    for i, draft in enumerate(drawn):
+        meanings = draft.guess.meanings if len(draft.log.channels) in widths else {}
+        unclear = {n: m for n, m in meanings.items() if m.symbol == "tau" and m.reason.startswith("CHECK")}
+        currents = {name: replace(meaning, symbol="i", reason=reason) for name, meaning in unclear.items()}
+        drawn[i] = replace(draft, guess=replace(draft.guess, meanings=draft.guess.meanings | currents))
+    return drawn
 
 
 @dataclass(frozen=True)
@@ -270,9 +260,8 @@ class _Writer:
     def why_empty(self) -> str:
         """Why nothing in the log can be used."""
         names = [channel.name for channel in self.draft.log.channels if not channel.derived]
-        return f"no position and effort of a joint, and no depth and force, among {', '.join(names[:8])}" + (
-            " ..." if len(names) > 8 else ""
-        )
+        some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+        return f"no position and effort of a joint, and no depth and force, among {some}"
 
     def row(self) -> Row:
         """The log in the table: its role, its rate, its joints, and what to look at first."""
@@ -330,7 +319,7 @@ class _Writer:
     def _unknown_units(self) -> set[str]:
         """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
         wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
-                if max(-low, high) > MAX_ANGLE_DRIVE}  # fmt: skip
+                if max(-low, high) > belonging.MAX_ANGLE_DRIVE}  # fmt: skip
         units = {channel.name: stated_unit(channel) for channel in self.draft.log.channels}
         return {
             name for name, m in self.draft.guess.meanings.items()
@@ -446,9 +435,8 @@ def _touch_line(channel: Channel, quantity: str, in_millimetres: bool) -> str:
     if in_millimetres:
         return f'{quantity} = {{ channel = {_text(channel.name)}, unit = "mm" }}  # unit by the size of its values'
     where = "" if channel.unit else "  # unit by its name" if unit else "  # the log gives no unit: CHECK THIS"
-    return (
-        f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit or SI[OF_THE_LOG[quantity]])} }}{where}"
-    )
+    unit = unit or SI[OF_THE_LOG[quantity]]
+    return f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit)} }}{where}"
 
 
 def _text(value: str) -> str:

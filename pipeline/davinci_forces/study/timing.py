@@ -108,9 +108,8 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
         return next((timing for timing in known if timing.time), known[0])
     if per_sample is not None:
         rate = columns.round_rate(per_sample.ratio)
-        return TimeGuess(
-            rate=rate, reason="at which the velocities match the derivatives of the positions", step=1 / rate
-        )
+        reason = "at which the velocities match the derivatives of the positions"
+        return TimeGuess(rate=rate, reason=reason, step=1 / rate)
     return TimeGuess(missing="no channel is a time, and no velocity tells the rate")
 
 
@@ -167,13 +166,10 @@ def _timing_of_format(
     """The clock of a format, with a remark where the velocities tell another rate."""
     t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
     step = log.clock.step if log.clock else _step(t) if len(t) > 1 else 0.0
-    timing = TimeGuess(step=step)
     if not step or slope is None or slope.agrees(1 / step):
-        return timing
+        return TimeGuess(step=step)
     fitted = columns.round_rate(slope.ratio)
-    unit = next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None)
-    if unit:
+    if unit := next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None):
         return TimeGuess(step=step, units=(unit,))
-    return TimeGuess(
-        step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
-    )
+    remark = f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
+    return TimeGuess(step=step, remark=remark)

@@ -4,7 +4,6 @@ Study, robot and scenario are read with it.
 """
 
 from davinci_forces.toml.lines import TomlFile
-from davinci_forces.toml.ranges import unlikely
-from davinci_forces.toml.table import TomlTable, excerpt, is_number, parse, read
+from davinci_forces.toml.table import TomlTable, excerpt, is_number, parse, read, unlikely
 
 __all__ = ["TomlFile", "TomlTable", "excerpt", "is_number", "parse", "read", "unlikely"]

@@ -136,7 +136,7 @@ class ArrowLog(Log):
             return _numbers(array, self.origin)
         lengths = pc.list_value_length(array).fill_null(size)
         if len(array) and pc.min_max(lengths).as_py() != {"min": size, "max": size}:
-            raise BadLog(f"{self.path}: the lists of {column!r} have different lengths; save a column for each place")
+            raise self.bad(f"the lists of {column!r} have different lengths; save a column for each place")
         present = _numbers(array.flatten(), self.origin).reshape(-1, size)
         if not array.null_count:
             return present

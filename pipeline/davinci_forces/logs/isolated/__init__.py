@@ -8,13 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from davinci_forces.errors import BadLog, install
 from davinci_forces.files import require_file
-from davinci_forces.logs.isolated.process import ChildEnded, Message, child
+from davinci_forces.logs.isolated.process import Answer, ChildEnded, Message, answers
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
-from davinci_forces.maths.arrays import Array
 
 SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
 BYTES_PER_SECOND = 5e6  # until a block: an index may be long
@@ -57,9 +55,7 @@ class IsolatedLog(Log):
             self.nans |= message["nans"]
             budget -= sum(column.nbytes for column in columns)
             if budget < 0:
-                raise BadLog(
-                    f"{self.path}: its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}"
-                )
+                raise self.bad(f"its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}")
             if columns:
                 yield dict(zip(names, columns, strict=True))
             if end := message.get("end"):
@@ -75,36 +71,27 @@ class IsolatedLog(Log):
 
 
 def _request(path: Path, reader: str) -> Message:
-    size = _size(path)
-    return {
-        "reader": reader,
-        "path": str(path.absolute()),
-        "names": None,
-        "size": size,
-        "seconds": SECONDS + size / BYTES_PER_SECOND,
-        "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
-        "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
-    }
-
-
-def _size(path: Path) -> int:
-    """Sum the bytes of a log, or of the files right in its folder, and refuse what is not a file; libraries do not."""
+    """Ask for a log, or a bag of the files right in a folder; refuses what is not a file, which libraries do not."""
     files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
     for file in files:
         require_file(file)
-    return sum(file.stat().st_size for file in files)
+    size = sum(file.stat().st_size for file in files)
+    return {
+        "reader": reader, "path": str(path.absolute()), "names": None, "size": size,
+        "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
+        "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
+    }  # fmt: skip
 
 
-def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], list[Array]]]:
+def _answers(path: Path, request: Message) -> Iterator[Answer]:
     problem = ""
     try:
-        with child() as reading:
-            for message, columns in reading.answers(request):
-                if "bad" in message:
-                    # Read to the end, so that the child can be used again; closing the generator would end it.
-                    problem = _problem(path, request, message)
-                    continue
-                yield message, columns
+        for message, columns in answers(request):
+            if "bad" in message:
+                # Read to the end, so that the child can be used again; closing the generator would end it.
+                problem = _problem(path, request, message)
+                continue
+            yield message, columns
     except ChildEnded as why:
         raise BadLog(f"{path}: reading it {why}, so it is not read: {REMEDY}") from None
     if problem:

@@ -1,4 +1,4 @@
-"""Child processes, from the parent's side: kept for the next log, ended when late or when the parent ends."""
+"""Child processes that read logs: the parent's side, which keeps or ends them, and their own side, with its limits."""
 
 import atexit
 import ctypes
@@ -9,23 +9,26 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from threading import Timer
 from typing import IO, Any
 
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 
 Message = dict[str, Any]
+Answer = tuple[Message, list[Array]]
 
 MAX_WAITING = 2  # children kept for the next log: starting one takes longer than reading a small file
-START = (
-    "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated.process import end_with_parent; "
-    "end_with_parent(); from davinci_forces.logs.isolated.child import serve; serve()"
-)
+START = "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated.process import serve; serve()"
 OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not have
 PACKAGES = Path(__file__).parents[3]
 # One thread each, and Arrow's memory from the system: memory that libraries reserve in advance counts as used.
 CHILD_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+FINAL_FIELDS = ("facts", "warnings", "comments", "dropped", "cut")  # of a log, complete after its last block
+FIELDS = ("format", "channels", "clock", "time", "started", "zone", *FINAL_FIELDS)
 PR_SET_PDEATHSIG = 1  # of Linux's prctl(2): the signal that a process gets when the thread that started it ends
 
 
@@ -52,7 +55,7 @@ class Child:
                 stderr=subprocess.DEVNULL, env=os.environ | CHILD_ENVIRONMENT,
             )  # fmt: skip
 
-    def answers(self, request: Message) -> Iterator[tuple[Message, list[Array]]]:
+    def answers(self, request: Message) -> Iterator[Answer]:
         """Send a request, and yield the answers piece by piece; raises ChildEnded if the child ends, or is late."""
         assert self.process.stdin
         assert self.process.stdout
@@ -105,13 +108,11 @@ class Child:
 _waiting: list[Child] = []
 
 
-@contextmanager
-def child() -> Iterator[Child]:
-    """Provide a child for one request, and keep it for the next one if it answered completely."""
-    taken = _taken()
-    whole = False
+def answers(request: Message) -> Iterator[Answer]:
+    """Have a child answer a request, and keep it for the next one if it answered completely; raises as `Child` does."""
+    taken, whole = _taken(), False
     try:
-        yield taken
+        yield from taken.answers(request)
         whole = True
     finally:
         if whole and len(_waiting) < MAX_WAITING:
@@ -162,3 +163,66 @@ def end_with_parent() -> None:
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+_opened: dict[Any, Log] = {}  # the log that was opened last, by all that it depends on
+
+
+def serve() -> None:
+    """Answer requests, in a child, until the parent has ended."""
+    end_with_parent()
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints must not mix with the answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            _answer(pickle.load(sys.stdin.buffer)[0], answers)
+
+
+def _answer(request: Message, answers: IO[bytes]) -> None:
+    """Answer one request; errors in a library are answers, too."""
+    _limit(request["memory"], request["cpu"])
+    try:
+        for message, columns in _answers(request):
+            send(answers, message, columns)
+    except BrokenPipeError:
+        raise
+    except BadLog as error:
+        send(answers, {"bad": str(error)})
+    except MemoryError:
+        _opened.clear()
+        send(answers, {"bad": "", "memory": True})
+    except Exception as error:
+        _opened.clear()
+        send(answers, {"bad": f"{type(error).__name__}: {error}", "fault": True})
+
+
+def _answers(request: Message) -> Iterator[Answer]:
+    """Yield the description of an opened log, or its blocks."""
+    path = Path(request["path"])
+    about = path.stat()
+    key = (request["reader"], path, about.st_mtime_ns, about.st_size)
+    if key not in _opened:
+        _opened.clear()
+        _opened[key] = import_module(request["reader"]).open_in_child(path)
+    log, names = _opened[key], request["names"]
+    if names is None:
+        yield {name: getattr(log, name) for name in FIELDS}, []
+        return
+    for block in log.blocks(names):
+        yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
+    yield {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}, []
+
+
+def _limit(memory: int, seconds: float) -> None:
+    """Limit the memory [bytes] and the further CPU time [s] of this process, enforced by the system."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    for limit, value in ((resource.RLIMIT_DATA, memory), (resource.RLIMIT_CPU, int(used + seconds) + 1)):
+        hard = resource.getrlimit(limit)[1]
+        value = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        with suppress(ValueError, OSError):
+            resource.setrlimit(limit, (value, hard))

@@ -1,14 +1,14 @@
 """LabVIEW measurement files (LVM): text with headers."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.lines import MARKS, Lines
-from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, read_ahead, unique
-from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, BadHeader, Layout, X
-from davinci_forces.logs.lvm.rows import Reading
+from davinci_forces.logs.log import BadContent, Channel, Clock, Log, Options, unique
+from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, Layout, X
+from davinci_forces.logs.lvm.rows import LvmLog, Reading
 from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.timeline import OwnClock, equal_columns
 
@@ -32,12 +32,12 @@ def read(path: Path, options: Options) -> Log:
             for _ in walk.runs(block, Run.looks_whole):
                 pass
         walk.finish()
-    except BadHeader as problem:
+    except BadContent as problem:
         raise BadLog(f"{path}:{walk.line}: {problem}") from None
     return _opened(path, options, walk)
 
 
-def _opened(path: Path, options: Options, walk: Walk) -> "LvmLog":
+def _opened(path: Path, options: Options, walk: Walk) -> LvmLog:
     layouts = list(walk.met.values())
     first = layouts[0]
     units: dict[str, str] = {}
@@ -65,7 +65,7 @@ def _opened(path: Path, options: Options, walk: Walk) -> "LvmLog":
     return log
 
 
-def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[OwnClock, ...]:
+def _own_clocks(log: LvmLog, walk: Walk, layouts: Sequence[Layout]) -> tuple[OwnClock, ...]:
     """Find the clocks of channels that were not sampled with the first channel."""
     x_of = {
         name: layout.names[i - 1]
@@ -75,7 +75,7 @@ def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[O
     groups = walk.groups
     if len(columns := [*dict.fromkeys(x_of.values())]) > 1:
         aside = replace(log, warnings=[], comments=[], nulls=dict.fromkeys(columns, 0), nans=dict.fromkeys(columns, 0))
-        same = equal_columns(columns, Reading(aside, log.options.encoding, tuple(columns)).blocks())
+        same = equal_columns(columns, Reading(aside, columns).blocks())
         number = {x: i for i, group in enumerate(same) for x in group}
         parts: dict[tuple[int, int], list[str]] = {}
         for i, group in enumerate(groups):
@@ -85,9 +85,8 @@ def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[O
     taken = [channel.name for channel in log.channels]
     others = [group for group in groups if layouts[0].first_channel not in group]
     times = unique([f"time of {group[0]}" for group in others], taken)
-    return tuple(
-        OwnClock(time, tuple(group), x_of.get(group[0], "")) for time, group in zip(times, others, strict=True)
-    )
+    timed = zip(times, others, strict=True)
+    return tuple(OwnClock(time, tuple(group), x_of.get(group[0], "")) for time, group in timed)
 
 
 def _rounded(layout: Layout) -> str:
@@ -107,21 +106,3 @@ def _facts(layout: Layout, walk: Walk) -> dict[str, str]:
     separator = layout.file.separator
     delimiter = {b"\t": "tab", b",": "comma", b";": "semicolon"}.get(separator, separator.decode())
     return tags | {"delimiter": delimiter, "X_Columns": layout.file.x_columns, "segments": str(walk.file_segments)}
-
-
-@dataclass
-class LvmLog(Log):
-    """An opened LVM file.
-
-    It has two derived channels.  `write` numbers, from 1, the write of each row: a new write begins at a new header, at
-    a blank line, or where x does not increase.  `elapsed` exists if several file segments have a date.  It is the time
-    since the start of the first one: the start of the row's file segment plus x.
-    """
-
-    options: Options = field(default_factory=Options)
-    clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
-
-    def _read(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the rows with a sample on the clock of these channels."""
-        [clock] = self.by_clock(names) or [""]
-        yield from read_ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())

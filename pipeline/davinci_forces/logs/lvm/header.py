@@ -8,7 +8,7 @@ from decimal import Decimal
 from functools import lru_cache
 
 from davinci_forces.logs.lines import decode
-from davinci_forces.logs.log import unique
+from davinci_forces.logs.log import BadContent, unique
 from davinci_forces.logs.timeline import Sampling
 
 MAGIC = b"LabVIEW Measurement"
@@ -18,10 +18,6 @@ SEPARATOR = re.compile(rb"Separator(.)(.*)", re.DOTALL)
 DATE_CELL = re.compile(r"(\d{4})/(\d\d?)/(\d\d?)")
 TIME_CELL = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?")
 FOR_PEOPLE = ("Operator", "Project", "Description", "Writer_Version", "Time_Pref")
-
-
-class BadHeader(ValueError):
-    """A header that makes the file unreadable; the message omits the place."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +71,10 @@ class Layout:
 
 
 def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
-    """Parse the header of a file, from its first line; raises BadHeader for an impossible mark or X_Columns."""
+    """Parse the header of a file, from its first line; raises BadContent for an impossible mark or X_Columns."""
     separator = _separator(lines)
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
-        raise BadHeader(
+        raise BadContent(
             f"the separator is {decode(separator, encoding)!r}, which cannot separate numbers; export with tabs"
         )
     cells = [decode(line, encoding).split(separator.decode()) for line in lines[1:]]
@@ -87,18 +83,19 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
     if not decimal and any(line.startswith(b"Decimal_Separator" + separator * 2) for line in lines):
         decimal = separator.decode()
     if decimal == separator.decode():
-        raise BadHeader(f"the separator and the decimal mark are both {decimal!r}; export the log again with another")
+        raise BadContent(f"the separator and the decimal mark are both {decimal!r}; export the log again with another")
     x_columns = tags.get("X_Columns", "One").capitalize()
     if x_columns not in ("No", "One", "Multi"):
-        raise BadHeader(f"X_Columns is {x_columns!r}, where LabVIEW writes No, One or Multi")
+        raise BadContent(f"X_Columns is {x_columns!r}, where LabVIEW writes No, One or Multi")
     several = tags.get("Multi_Headings", "No").lower() == "yes"
     return FileHeader(separator, decimal, x_columns, several, tags)
 
 
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
-    """Parse the header and the column line of a file segment; raises BadHeader without names, or if x is no time."""
+    """Parse the header and the column line of a file segment; raises BadContent without names, or if x is no time."""
     separator = file.separator.decode()
-    tags = _tags(lines, separator, encoding)
+    rows = [decode(text, encoding).split(separator) for text in lines]
+    tags = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)
     measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
     _check(tags, len(measured), line, remarks)
@@ -109,7 +106,9 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     x_unit = _first(tags, "X_Unit_Label") or "s"
     units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
-    start, started = _started(tags, file)
+    start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
+    if not started:
+        start, started = _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
     sampled = [i for i in measured if _cell(tags, "Samples", i) != "0"]  # without samples the other cells mean nothing
     written = _first(tags, "Delta_X")
     notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
@@ -132,16 +131,6 @@ def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
     """Return the cell of a tag for one column of a row, or ""."""
     cells = tags.get(tag, [])
     return cells[column - 1] if 0 < column <= len(cells) else ""
-
-
-def _tags(lines: Sequence[bytes], separator: str, encoding: str | None) -> dict[str, list[str]]:
-    rows = [decode(text, encoding).split(separator) for text in lines]
-    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
-
-
-def _started(tags: dict[str, list[str]], file: FileHeader) -> tuple[Decimal | None, str]:
-    start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
-    return (start, started) if started else _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
 
 
 def unescape(comment: bytes, encoding: str | None) -> str:
@@ -169,7 +158,7 @@ def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], li
     if cells and cells[-1] == "Comment":
         cells.pop()
     if not cells or (cells[0] != X and any(_number(cell) is not None for cell in cells)):
-        raise BadHeader(f"the column line, which names the channels and begins with {X}, is missing")
+        raise BadContent(f"the column line, which names the channels and begins with {X}, is missing")
     names = list(unique([X if _is_x(i, file) else cell for i, cell in enumerate(cells)]))
     remarks = [
         f"line {line}: channel {i} has no name, or that of another ({cell!r}); it is read as {name!r}"
@@ -184,7 +173,7 @@ def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], li
 def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[str]) -> None:
     dimension = _first(tags, "X_Dimension") or "Time"
     if dimension != "Time":
-        raise BadHeader(f"the x axis is {dimension}, not time; this is not a recording over time: choose another file")
+        raise BadContent(f"the x axis is {dimension}, not time; this is not a recording over time: choose another file")
     stated = _first(tags, "Channels")
     if stated.isdecimal() and int(stated) != channels:
         remarks.append(

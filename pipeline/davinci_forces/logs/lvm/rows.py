@@ -3,14 +3,15 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
 from davinci_forces.logs.lines import Lines, decode
-from davinci_forces.logs.log import Block, Log
-from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescape
+from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
+from davinci_forces.logs.lvm.header import Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import OwnClock
@@ -22,21 +23,37 @@ MAX_REMARKS_OF_A_KIND = 5  # remarks that differ in numbers only; further ones a
 DIGITS = re.compile(r"\d+")
 
 
+@dataclass
+class LvmLog(Log):
+    """An opened LVM file.
+
+    It has two derived channels.  `write` numbers, from 1, the write of each row: a new write begins at a new header, at
+    a blank line, or where x does not increase.  `elapsed` exists if several file segments have a date.  It is the time
+    since the start of the first one: the start of the row's file segment plus x.
+    """
+
+    options: Options = field(default_factory=Options)
+    clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
+
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the rows with a sample on the clock of these channels."""
+        yield from read_ahead(Reading(self, names).blocks())
+
+
 class Reading:
     """A pass over the file; its warnings and counts go into the log."""
 
-    def __init__(
-        self, log: Log, encoding: str | None, names: tuple[str, ...], clocks: Sequence[OwnClock] = (), clock: str = ""
-    ) -> None:
-        self.log, self.names, self.encoding = log, names, encoding
+    def __init__(self, log: LvmLog, names: Sequence[str]) -> None:
+        self.log, self.names, self.encoding = log, tuple(names), log.options.encoding
+        [clock] = log.by_clock(names) or [""]
         self.derived = [channel.name for channel in log.channels if channel.derived and channel.kind != "time"]
-        self.own = next((c for c in clocks if c.time == clock), None)
-        others = {name for c in clocks for name in (*c.channels, c.x)}
+        self.own = next((c for c in log.clocks if c.time == clock), None)
+        others = {name for c in log.clocks for name in (*c.channels, c.x)}
         written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
         first = tuple(name for name in written if name not in others) if others else ()
         self.together = (*self.own.channels, self.own.x) if self.own else first  # some have a sample in a row
         self.say = Remarks(log.warnings)
-        self.walk, self.lines = Walk(encoding, self.say), Lines(log.path, encoding)
+        self.walk, self.lines = Walk(self.encoding, self.say), Lines(log.path, self.encoding)
         self.write = self.rows = self.rows_in_segment = self.back = 0
         self.went_back = ""
         self.last_x = np.nan
@@ -51,7 +68,7 @@ class Reading:
                 for run, cells in self.walk.runs(block, self._at_once):
                     yield self._block(run, cells or self._carefully(run))
             self.walk.finish()
-        except BadHeader as problem:
+        except BadContent as problem:
             raise BadLog(f"{self.log.path}:{self.walk.line}: {problem}") from None
         self._close()
 

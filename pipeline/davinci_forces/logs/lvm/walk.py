@@ -13,7 +13,8 @@ import numpy as np
 
 from davinci_forces.logs.cells import NUMBER
 from davinci_forces.logs.lines import Block
-from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, file_header, layout
+from davinci_forces.logs.log import BadContent
+from davinci_forces.logs.lvm.header import END, MAGIC, FileHeader, Layout, X, file_header, layout
 from davinci_forces.logs.timeline import refine_groups
 
 WRITTEN = re.compile(rb"-?\d+[.,]\d+(E[+-]?\d+)?|NaN|-?Inf")  # as LabVIEW writes a number: always with a fraction
@@ -86,7 +87,7 @@ class Walk:
         """Split a block of complete lines into runs of rows.
 
         `take` is called with a possible run and its number of lines, and returns None if it is no run.  Such a block is
-        halved, until only the lines around the problem are read one by one.  Raises BadHeader if a header makes the
+        halved, until only the lines around the problem are read one by one.  Raises BadContent if a header makes the
         file unreadable; `line` says where.
         """
         run = self._whole(block)
@@ -124,7 +125,7 @@ class Walk:
             yield self._done.pop()
 
     def finish(self) -> None:
-        """Check that the file did not end within a header; raises BadHeader if it has no column line."""
+        """Check that the file did not end within a header; raises BadContent if it has no column line."""
         if self.state == "row" or (self.state == "between" and self.layout):
             return
         problem = {
@@ -133,7 +134,7 @@ class Walk:
             "between": "no header of a file segment follows the file's header",
         }.get(self.state, f"no line {END.decode()} ends the header")
         if self.layout is None:
-            raise BadHeader(f"{problem}; without it the samples have no names")
+            raise BadContent(f"{problem}; without it the samples have no names")
         self.say(f"line {self.line}: the file ends within a header ({problem}); the rows before it are read")
 
     def _before(self, line: bytes) -> str:
@@ -209,7 +210,7 @@ class Walk:
     def _collected(self, line: bytes, state: str) -> str:
         self._header.append(line)
         if len(self._header) > MAX_HEADER_LINES:
-            raise BadHeader(f"no line {END.decode()} ends the header within {MAX_HEADER_LINES} lines")
+            raise BadContent(f"no line {END.decode()} ends the header within {MAX_HEADER_LINES} lines")
         return state
 
     def _take(self, line: bytes, separator: bytes, layout: Layout) -> None:

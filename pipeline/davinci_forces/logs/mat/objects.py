@@ -32,9 +32,8 @@ class MatlabObject:
 
 def is_object(value: Any) -> bool:
     """Whether a value holds the numbers of objects."""
-    return (
-        isinstance(value, np.ndarray) and value.dtype == np.uint32 and value.size > 3 and value.flat[0] == OBJECT_MARK
-    )
+    are_numbers = isinstance(value, np.ndarray) and value.dtype == np.uint32
+    return are_numbers and value.size > 3 and bool(value.flat[0] == OBJECT_MARK)
 
 
 class Objects:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.log import Block, Channel, Log, unique
-from davinci_forces.logs.ros.layout import Layout, Unlike, layout_of, numbers_at, stamps_at
+from davinci_forces.logs.log import BadContent, Block, Channel, Log, unique
+from davinci_forces.logs.ros.layout import Layout, layout_of, numbers_at, stamps_at
 from davinci_forces.logs.ros.scan import Batch
 from davinci_forces.logs.ros.storage import Bag, types_of
 from davinci_forces.logs.timeline import UNIX_EPOCH
@@ -82,9 +82,9 @@ def _topics(log: Log, bag: Bag) -> list[Topic]:
     for (name, kind), connections in sorted(by_name.items(), key=lambda item: item[0]):
         try:
             if name in topics or kind.startswith(SERVICES):
-                raise Unlike("")
+                raise BadContent("")
             topics[name] = _topic(log, bag, name, kind, connections)
-        except Unlike as why:
+        except BadContent as why:
             others.append(f"{name} ({_short(kind)}{f': {why}' if str(why) else ''})")
     if others:
         more = [f"{len(others) - SHOWN_TOPICS} more"] if len(others) > SHOWN_TOPICS else []
@@ -96,20 +96,20 @@ def _topic(log: Log, bag: Bag, name: str, kind: str, connections: list[Any]) -> 
     """Describe a topic by messages of different sizes; the one with the most numbers stands for it."""
     samples = [(c, time, content) for c in connections for time, content in bag.samples(c)]
     if not samples:
-        raise Unlike("no message")
+        raise BadContent("no message")
     samples.sort(key=lambda sample: sample[1])
     layouts, problems = [], []
     for connection, _, content in samples:
         try:
             layouts.append((_layout(connection, content), content))
-        except Unlike as problem:
+        except BadContent as problem:
             problems.append(problem)
     if not layouts:
-        raise Unlike(f"a message {problems[0]}")
+        raise BadContent(f"a message {problems[0]}")
     earliest, content = layouts[0]
     first = max((layout for layout, _ in layouts), key=lambda layout: len(layout.numbers))
     if not first.numbers:
-        raise Unlike(_wide(first) or "no numbers outside of lists of messages")
+        raise BadContent(_wide(first) or "no numbers outside of lists of messages")
     start = int(stamps_at(earliest.stamp, np.frombuffer(content, np.uint8)[None])[0]) if earliest.stamp else 0
     topic = Topic(name, connections, first, start or samples[0][1], start != 0, set())
     for connection, _, sample in samples:
@@ -128,7 +128,7 @@ def _numbers_of(topic: Topic, connection: Any, content: bytes) -> set[str]:
     """The numbers of a message; all, where it is of other joints, or is refused when it is read."""
     try:
         layout = _layout(connection, content, topic.first)
-    except Unlike:
+    except BadContent:
         return set(topic.first.numbers)
     return set((topic.first if topic.is_of_others(layout) else layout).numbers)
 
@@ -139,7 +139,7 @@ def _wide(layout: Layout) -> str:
 
 def _layout(connection: Any, content: bytes, first: Layout | None = None) -> Layout:
     if connection.ext not in ENCODINGS_OF_MESSAGES:
-        raise Unlike(f"is encoded as {connection.ext}")
+        raise BadContent(f"is encoded as {connection.ext}")
     ros1 = connection.ext == "ros1"
     return layout_of(content, connection.msgtype, types_of(connection.msgdef, connection.msgtype, ros1), ros1, first)
 
@@ -196,8 +196,8 @@ class BagLog(Log):
     def _layout_of(self, topic: Topic, connection: Any, content: bytes, number: int) -> Layout:
         try:
             return _layout(connection, content, topic.first)
-        except Unlike as how:
-            raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record these separately") from None
+        except BadContent as how:
+            raise self.bad(f"message {number} of {topic.name} {how}; record these separately") from None
 
     def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
         """The samples of a channel in messages of one layout."""
@@ -207,8 +207,8 @@ class BagLog(Log):
         if place := layout.numbers.get(quantity):
             return numbers_at(place, table)
         joint = topic.first.numbers[quantity].joint
-        raise BadLog(
-            f"{self.path}: message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
+        raise self.bad(
+            f"message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
             "the first message has; record these separately"
         )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from davinci_forces.logs.arrays import MAX_COLUMNS
+from davinci_forces.logs.log import BadContent
 from davinci_forces.maths.arrays import Array
 
 HEADER_TYPE = "std_msgs/msg/Header"
@@ -33,10 +34,6 @@ UNITS = {
     "geometry_msgs/msg/Transform": {"translation": "m"},
     "sensor_msgs/msg/Imu": {"angular_velocity": "rad/s", "linear_acceleration": "m/s^2"},
 }
-
-
-class Unlike(ValueError):
-    """A message that its definition or the first of its topic does not fit; the text says how."""
 
 
 @dataclass(frozen=True)
@@ -90,15 +87,15 @@ def _view(place: Place, table: NDArray[np.uint8]) -> NDArray[Any]:
 
 
 def layout_of(content: bytes, kind: str, types: Any, ros1: bool, first: Layout | None = None) -> Layout:
-    """Lay out a message, with joints numbered as in `first`; raises Unlike if its bytes are not of this type."""
+    """Lay out a message, with joints numbered as in `first`; raises BadContent if its bytes are not of this type."""
     try:
         walk = _Walk(content, types, ros1)
         walk.message(kind, "", "", _holder(types[kind][1]))
         walk.require_end()
     except KeyError as missing:
-        raise Unlike(f"holds {missing.args[0]}, which the bag does not define") from None
+        raise BadContent(f"holds {missing.args[0]}, which the bag does not define") from None
     except (struct.error, IndexError, UnicodeDecodeError, RecursionError):
-        raise Unlike(f"does not fit its definition in its {len(content)} bytes") from None
+        raise BadContent(f"does not fit its definition in its {len(content)} bytes") from None
     return walk.layout(kind, first)
 
 
@@ -113,7 +110,7 @@ class _Walk:
 
     def __init__(self, content: bytes, types: Any, ros1: bool) -> None:
         if not ros1 and content[:2] not in ENCODINGS:
-            raise Unlike(f"is encoded as {content[:2].hex()}, which is not plain CDR")
+            raise BadContent(f"is encoded as {content[:2].hex()}, which is not plain CDR")
         self.content, self.types, self.ros1 = content, types, ros1
         self.at = self.origin = 0 if ros1 else 4
         self.order = "<" if ros1 or content[1] else ">"
@@ -176,7 +173,7 @@ class _Walk:
         if kind == "string":
             self._text()
         elif kind not in NUMBER_TYPES:
-            raise Unlike(f"holds {path} of type {kind}, which is not supported")
+            raise BadContent(f"holds {path} of type {kind}, which is not supported")
         else:
             dtype = np.dtype(NUMBER_TYPES[kind])
             self._number(path, dtype, dtype.itemsize, length, unit)
@@ -229,7 +226,7 @@ class _Walk:
         scope = max((s for s in self.names if not s or path.startswith(f"{s}.")), key=len, default=None)
         names, length = () if scope is None else self.names[scope], layout.lengths[path]
         if kind == JOINTS and names and length not in (0, len(names)):
-            raise Unlike(f"names {len(names)} joints but has {length} of {path}")
+            raise BadContent(f"names {len(names)} joints but has {length} of {path}")
         layout.joints_of[path] = joints = names if length == len(names) else ()
         if length > MAX_COLUMNS or (not joints and length != first.lengths.get(path)):
             return

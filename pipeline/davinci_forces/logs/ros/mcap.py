@@ -7,7 +7,8 @@ from zlib import crc32
 
 from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionFormat
 
-from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
+from davinci_forces.logs.log import BadContent
+from davinci_forces.logs.ros.scan import Chunk, Scan
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE_OF_MCAP, CHUNK_OF_MCAP, STATISTICS, DATA_END = 2, 3, 4, 5, 6, 11, 15
@@ -43,7 +44,7 @@ class Mcap(Scan):
                 summary, _, crc = struct.unpack("<QQI", record)
                 _require_crc(crc, content[summary or begin - 9 : end - 4], "the summary")
                 if content[end:] != MCAP_MAGIC:
-                    raise Damage("it does not end as MCAP ends")
+                    raise BadContent("it does not end as MCAP ends")
                 return
             else:
                 self._take(kind, record, begin, end)
@@ -73,11 +74,11 @@ class Mcap(Scan):
             _require_crc(crc, records, "a chunk")
         for kind, first, last in _records(records, 0):
             if kind == CHUNK_OF_MCAP:
-                raise Damage("a chunk is in a chunk")
+                raise BadContent("a chunk is in a chunk")
             self._take(kind, records[first:last], first, last)
         self.chunk = 0
         if not whole:
-            raise Damage("the file ends in a chunk")
+            raise BadContent("the file ends in a chunk")
 
     def _take(self, kind: int, record: memoryview, begin: int, end: int) -> None:
         if kind == MESSAGE_OF_MCAP:
@@ -103,7 +104,7 @@ def _records(content: memoryview, at: int) -> Iterator[tuple[int, int, int]]:
         kind, length = struct.unpack_from("<BQ", content, at)
         begin, end = at + 9, at + 9 + length
         if end > len(content) and kind != CHUNK_OF_MCAP:
-            raise Damage("a record ends beyond the file")
+            raise BadContent("a record ends beyond the file")
         yield kind, begin, end
         at = end
 
@@ -112,11 +113,11 @@ def _text(record: memoryview, at: int) -> tuple[str, int]:
     """A text behind its length, and where it ends."""
     end = at + 4 + struct.unpack_from("<I", record, at)[0]
     if end > len(record):
-        raise Damage("a text ends beyond its record")
+        raise BadContent("a text ends beyond its record")
     return bytes(record[at + 4 : end]).decode(), end
 
 
 def _require_crc(stated: int, content: memoryview, what: str) -> None:
     """Require that the checksum is the one that the file states; 0 states none."""
     if stated and crc32(content) != stated:
-        raise Damage(f"the checksum of {what} does not match")
+        raise BadContent(f"the checksum of {what} does not match")

@@ -10,7 +10,8 @@ from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionF
 from rosbags.typesys.msg import normalize_msgtype
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
+from davinci_forces.logs.log import BadContent
+from davinci_forces.logs.ros.scan import Chunk, Scan
 
 MAGIC_1 = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_RECORD, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
@@ -41,12 +42,13 @@ class Rosbag1(Scan):
             elif kind == CHUNK:
                 self._scan_chunk(fields, content[begin:end], end <= len(content))
             elif kind == CHUNK_INFO:
-                self._state(fields, content[begin:end])
+                stated = Counter(dict(struct.iter_unpack("<II", content[begin:end])))
+                self.stated[int.from_bytes(fields[b"chunk_pos"], "little")] = stated
             elif kind in (CONNECTION, MESSAGE):
                 self.listed += kind == CONNECTION
                 self._take(kind, fields, content, begin, end)
             elif kind != INDEX:
-                raise Damage(f"a record is of the unknown kind {kind}")
+                raise BadContent(f"a record is of the unknown kind {kind}")
             self.at = min(end, len(content))
 
     def is_closed(self, content: memoryview) -> bool:
@@ -71,7 +73,7 @@ class Rosbag1(Scan):
             end = begin + U32(content, begin - 4)[0]
             fields = _fields(content[at + 4 : begin - 4].tobytes())
             if end > size and fields[b"op"][0] != CHUNK:
-                raise Damage("a record ends beyond the file")
+                raise BadContent("a record ends beyond the file")
             yield fields, begin, end
             at = end
 
@@ -88,12 +90,12 @@ class Rosbag1(Scan):
         before = Counter({c: len(places) // 4 for c, places in self.places.items()})
         for inner, begin, end in self._records(records, 0):
             if (kind := inner[b"op"][0]) not in (CONNECTION, MESSAGE):
-                raise Damage(f"a record of kind {kind} is in a chunk")
+                raise BadContent(f"a record of kind {kind} is in a chunk")
             self._take(kind, inner, records, begin, end)
         self.counts[self.at] = Counter({c: len(places) // 4 for c, places in self.places.items()}) - before
         self.chunk = 0
         if not whole:
-            raise Damage("the file ends in a chunk")
+            raise BadContent("the file ends in a chunk")
 
     def _take(self, kind: int, fields: Fields, content: memoryview, begin: int, end: int) -> None:
         connection = U32(fields[b"conn"])[0]
@@ -105,9 +107,6 @@ class Rosbag1(Scan):
         definition = MessageDefinition(MessageDefinitionFormat.MSG, about[b"message_definition"].decode())
         kind_of = normalize_msgtype(about[b"type"].decode())
         self.add(Connection(connection, fields[b"topic"].decode(), kind_of, definition, "", 0, "ros1", self))
-
-    def _state(self, fields: Fields, content: memoryview) -> None:
-        self.stated[int.from_bytes(fields[b"chunk_pos"], "little")] = Counter(dict(struct.iter_unpack("<II", content)))
 
 
 def _fields(header: bytes) -> Fields:

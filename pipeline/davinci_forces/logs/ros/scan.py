@@ -22,6 +22,7 @@ except ImportError:
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
+from davinci_forces.logs.log import BadContent
 
 Integers = NDArray[np.int64]
 Table = Callable[[Integers], NDArray[np.uint8]]  # from numbers of messages of one size to their bytes, a row each
@@ -35,10 +36,6 @@ CACHED_CHUNKS = 4
 BATCH_MESSAGES = 1 << 13  # messages that are read at a time
 BATCH_BYTES = 1 << 24  # and their size, whichever is reached first
 MAX_SIZES = 32  # messages of different sizes that stand for a topic
-
-
-class Damage(Exception):
-    """A record that is not whole, or not as the format says; the text says how."""
 
 
 def decompress(content: bytes) -> bytes:
@@ -60,15 +57,15 @@ class Chunk:
         if self.compression in UNPACKED:
             unpacked = self.content
         elif self.compression not in DECOMPRESSORS:
-            raise Damage(f"a chunk is compressed by {self.compression!r}, which is not supported")
+            raise BadContent(f"a chunk is compressed by {self.compression!r}, which is not supported")
         else:
             try:
                 decompressor = DECOMPRESSORS[self.compression]()
                 unpacked = memoryview(decompressor.decompress(self.content, max_length=self.size + 1))
             except DECOMPRESSION_ERRORS as error:
-                raise Damage(f"a chunk cannot be decompressed ({error})") from None
+                raise BadContent(f"a chunk cannot be decompressed ({error})") from None
         if self.whole and len(unpacked) != self.size:
-            raise Damage(f"a chunk holds {len(unpacked)} bytes instead of {self.size}")
+            raise BadContent(f"a chunk holds {len(unpacked)} bytes instead of {self.size}")
         return unpacked
 
 
@@ -107,7 +104,7 @@ class Scan:
         problem = ""
         try:
             self.scan(content)
-        except Damage as damage:
+        except BadContent as damage:
             problem = str(damage)
         except MALFORMED as error:
             problem = f"a record is not whole: {error}"
@@ -159,7 +156,7 @@ class Scan:
         try:
             self.places[connection].extend((time, self.chunk, begin, end))
         except (KeyError, OverflowError):
-            raise Damage("a message is of an unknown topic or time") from None
+            raise BadContent("a message is of an unknown topic or time") from None
 
     def content_of(self, number: int) -> memoryview:
         """The content of a chunk; a few are kept."""

@@ -96,9 +96,8 @@ class Database:
         self.base.executescript(MESSAGE_SIZES)
         for number, *size in self.base.execute("SELECT topic, timestamp, id, size, count FROM sizes"):
             self.sizes.setdefault(number, []).append(size)
-        for number, topic, kind, serialization in self.base.execute(
-            "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
-        ):
+        query = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        for number, topic, kind, serialization in self.base.execute(query):
             encoding, text = definitions.get(kind, ("", ""))
             definition = MessageDefinition(FORMATS_OF_ROS_2.get(encoding, MessageDefinitionFormat.NONE), text)
             count = sum(size[-1] for size in self.sizes.setdefault(number, []))

@@ -10,11 +10,11 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, unique
+from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead, row_count, unique
 from davinci_forces.logs.tdms import samples
 from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, set_clocks
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBER_CODES, TIME, Objects, names
-from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, Queue, pieces, rows_of, side_by_side
+from davinci_forces.logs.tdms.samples import PIECE_ROWS, Index, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
 from davinci_forces.logs.timeline import Timeline, moment
 
@@ -86,12 +86,9 @@ class TdmsLog(Log):
     scales: dict[str, dict[str, Any]] = field(default_factory=dict)  # properties of other scaled channels, by path
     origin: int = 0  # [s] since 1904; the zero of time stamps
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived time channels
-    mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel mean two things
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples; shorter channels are filled up with NaN."""
-        if problem := next((self.mixed[name] for name in names if name in self.mixed), ""):
-            raise BadLog(f"{self.path}: {problem}")
         yield from read_ahead(self._timed(names))
 
     def _timed(self, asked_for: Sequence[str]) -> Iterator[Block]:
@@ -100,7 +97,7 @@ class TdmsLog(Log):
         written = [name for name in asked_for if name not in timelines]
         row = 0
         for block in self._blocks(written) if written else _rows(timelines):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             block |= {name: timeline.times(row, count) for name, timeline in timelines.items()}
             yield {name: block[name] for name in asked_for}
             row += count
@@ -109,10 +106,10 @@ class TdmsLog(Log):
         path_of = {name: path for path, name in self.names.items()}
         paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.groups([path for path in paths if path not in self.scaled])
-        scaled = self.index.groups([path for path in paths if path in self.scaled])
+        groups = plain + self.index.groups([path for path in paths if path in self.scaled])
         with open_file(self.path) as file:
-            queues = [Queue(self._source(file, group), group) for group in (*plain, *scaled)]
-            for block, lacking in side_by_side(queues, rows_of(len(paths))):
+            sources = [self._source(file, group) for group in groups]
+            for block, lacking in side_by_side(sources, groups, rows_of(len(paths))):
                 missing = {self.names[path]: count for path, count in lacking.items()}
                 yield self.count_nans({self.names[path]: samples for path, samples in block.items()}, missing)
 
@@ -129,7 +126,7 @@ class TdmsLog(Log):
         try:
             yield from read
         except Exception as error:
-            raise BadLog(f"{self.path}: npTDMS cannot read channel {path} ({error})") from error
+            raise self.bad(f"npTDMS cannot read channel {path} ({error})") from error
 
 
 def _rows(timelines: Mapping[str, Timeline]) -> Iterator[Block]:
@@ -148,14 +145,14 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
     log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW)
     for path in latest:
         if problem := samples.problem(scales := _scales(properties, path)):
-            raise BadLog(f"{log.path}: channel {path} {problem}")
+            raise log.bad(f"channel {path} {problem}")
         if scales and path not in log.scaled:
             log.scales[path] = scales
     for path, first in walk.objects.revised.items():
         # The first property that changes the meaning of samples: a unit or a scale.
         word = next((word for word in first if word.lower() in UNIT_PROPERTIES or word.startswith("NI_Scal")), "")
         if word and path in latest:
-            log.mixed[log.names[path]] = (
+            log.unread[log.names[path]] = (
                 f"channel {log.names[path]!r} has {word} = {first[word]!r} first and {properties[path][word]!r} in a "
                 "later file segment, so its samples mean two things; split the file, or record it again"
             )

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from davinci_forces.logs.log import BadContent
 from davinci_forces.logs.timeline import moment
 
 NO_DATA, AS_BEFORE = 0xFFFFFFFF, 0
@@ -23,10 +24,6 @@ COMPLEX = (0x08000C, 0x10000D)
 SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of one value, except text
 SIZES |= {kind: np.dtype(code).itemsize for kind, code in NUMBER_CODES.items()}
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
-
-
-class Damaged(ValueError):
-    """The bytes are not TDMS metadata."""
 
 
 @dataclass(frozen=True)
@@ -49,24 +46,21 @@ class Objects:
     revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # by path: the first values of changed ones
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
-        """Add the metadata of one file segment; raises Damaged if it is truncated, or cannot be parsed."""
+        """Add the metadata of one file segment; raises BadContent if it is truncated, or cannot be parsed."""
         take = _Cursor(metadata, order)
-        try:
-            self._update(take, renew)
-        except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
-            raise Damaged(f"its metadata cannot be parsed after {take.at} bytes ({error})") from None
-
-    def _update(self, take: "_Cursor", renew: bool) -> None:
         self.active = {} if renew else dict(self.active)
-        for _ in range(take.number("I")):
-            path = take.text()
-            properties = self.properties.setdefault(path, {})
-            self._index(path, take.number("I"), take)
+        try:
             for _ in range(take.number("I")):
-                name, value = take.text(), take.value(take.number("I"))
-                if properties.get(name) not in (None, "", value):
-                    self.revised.setdefault(path, {}).setdefault(name, properties[name])
-                properties[name] = value
+                path = take.text()
+                properties = self.properties.setdefault(path, {})
+                self._index(path, take.number("I"), take)
+                for _ in range(take.number("I")):
+                    name, value = take.text(), take.value(take.number("I"))
+                    if properties.get(name) not in (None, "", value):
+                        self.revised.setdefault(path, {}).setdefault(name, properties[name])
+                    properties[name] = value
+        except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
+            raise BadContent(f"its metadata cannot be parsed after {take.at} bytes ({error})") from None
 
     def _index(self, path: str, header: int, take: "_Cursor") -> None:
         if header == NO_DATA:

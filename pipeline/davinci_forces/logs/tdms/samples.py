@@ -11,13 +11,14 @@ import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from mmap import ACCESS_READ, mmap
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from davinci_forces.logs.log import Block
+from davinci_forces.logs.log import Block, concatenate, row_count
 from davinci_forces.logs.tdms.metadata import names
 from davinci_forces.logs.tdms.walk import BLOCK, Column, Region
 
@@ -132,50 +133,35 @@ def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
     return samples.astype(np.float64).reshape(-1)  # a copy, so that the bytes read can be freed
 
 
-class Queue:
-    """Samples of some channels that were read and not yet passed on."""
-
-    def __init__(self, source: Iterator[Block], paths: Sequence[str]) -> None:
-        self.source, self.paths = source, paths
-        self.parts: list[Block] = []
-        self.length, self.ended = 0, False
-
-    def fill(self, rows: int) -> None:
-        """Read until there are enough rows, or the source ends."""
-        while self.length < rows and not self.ended:
-            part = next(self.source, None)
-            if part is None:
-                self.ended = True
-            else:
-                self.parts.append(part)
-                self.length += len(part[self.paths[0]])
-
-    def take(self, rows: int) -> tuple[Block, int]:
-        """Return the next rows, filled up with NaN after the end, and the number of filled rows."""
-        lacking = max(0, rows - self.length)
-        whole = {path: np.concatenate([part[path] for part in self.parts] or [np.empty(0)]) for path in self.paths}
-        self.parts = [{path: samples[rows:] for path, samples in whole.items()}] if self.length > rows else []
-        self.length = max(0, self.length - rows)
-        fill = np.full(lacking, np.nan)
-        return {p: np.concatenate((s[:rows], fill)) if lacking else s[:rows] for p, s in whole.items()}, lacking
-
-
-def side_by_side(queues: Sequence[Queue], most: int = PIECE_ROWS) -> Iterator[tuple[Block, dict[str, int]]]:
-    """Yield blocks of all channels, of about `most` rows, with the missing samples of each, until the longest ends."""
-    while True:
-        for queue in queues:
-            queue.fill(most)
-        going = [queue.length for queue in queues if not queue.ended]
-        rows = min(going) if going else max((queue.length for queue in queues), default=0)
-        if not rows:
-            return
+def side_by_side(
+    sources: Sequence[Iterator[Block]], groups: Sequence[Sequence[str]], rows: int
+) -> Iterator[tuple[Block, dict[str, int]]]:
+    """Yield blocks of the channels of all groups, with the missing samples of each: shorter ones end in NaN."""
+    for parts in zip_longest(*(_recut(source, rows) for source in sources), fillvalue=Block()):
+        count = max(map(row_count, parts))
         block: Block = {}
         lacking: dict[str, int] = {}
-        for queue in queues:
-            part, short = queue.take(rows)
-            block |= part
-            lacking |= dict.fromkeys(queue.paths, short)
+        for group, part in zip(groups, parts, strict=True):
+            fill = np.full(count - row_count(part), np.nan)
+            lacking |= dict.fromkeys(group, len(fill))
+            block |= {p: np.concatenate((part[p], fill)) if part else fill for p in group} if len(fill) else part
         yield block, lacking
+
+
+def _recut(source: Iterator[Block], rows: int) -> Iterator[Block]:
+    """Join and cut pieces to blocks of so many rows; only the last is shorter."""
+    waiting: list[Block] = []
+    length = 0
+    for piece in source:
+        waiting.append(piece)
+        length += row_count(piece)
+        if length >= rows:
+            whole = concatenate(waiting)
+            *cuts, rest = (slice(first, first + rows) for first in range(0, length + 1, rows))
+            waiting, length = [{path: samples[rest] for path, samples in whole.items()}], length % rows
+            yield from ({path: samples[cut] for path, samples in whole.items()} for cut in cuts)
+    if length:
+        yield concatenate(waiting)
 
 
 class Part(mmap):
@@ -190,9 +176,8 @@ class Part(mmap):
 
 def is_scaled(properties: dict[str, Any]) -> bool:
     """Whether the values still have to be scaled by the properties."""
-    return properties.get("NI_Scaling_Status", "unscaled") != "scaled" and (
-        properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
-    )
+    has_scale = properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
+    return has_scale and properties.get("NI_Scaling_Status", "unscaled") != "scaled"
 
 
 def problem(properties: dict[str, Any]) -> str:

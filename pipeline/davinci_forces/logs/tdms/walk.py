@@ -11,7 +11,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from davinci_forces.logs.tdms.metadata import DAQMX_RAW, NUMBER_CODES, SIZES, STRING, TIME, Damaged, Objects, Samples
+from davinci_forces.logs.log import BadContent
+from davinci_forces.logs.tdms.metadata import DAQMX_RAW, NUMBER_CODES, SIZES, STRING, TIME, Objects, Samples
 
 TAG = b"TDSm"
 LEAD_IN = 28  # [bytes]
@@ -78,7 +79,7 @@ class Walk:
                     self.objects.update(metadata, order, bool(toc & HAS_NEW_LIST))
                 more = self._alike(lead + metadata, end, LEAD_IN + length) if whole else 0
                 yield from self._within(toc, order, data, end, more, LEAD_IN + length, whole)
-            except Damaged as problem:
+            except BadContent as problem:
                 self.say(
                     f"byte {at}: the file segment that begins here is damaged: {problem}; neither it nor the data "
                     "after it is read"
@@ -196,7 +197,7 @@ def _interleaved(active: dict[str, Samples], order: str, data: int, length: int)
     sizes = {path: SIZES.get(samples.kind, 0) for path, samples in active.items()}
     row = sum(sizes.values())
     if len({samples.count for samples in active.values()}) > 1 or not all(sizes.values()):
-        raise Damaged("interleaved channels of unequal lengths, or of text")
+        raise BadContent("interleaved channels of unequal lengths, or of text")
     offsets = np.cumsum([0, *sizes.values()]).tolist()
     columns = {
         path: Column(dtype, offset, row, 1)

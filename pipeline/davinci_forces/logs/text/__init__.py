@@ -12,10 +12,10 @@ import pyarrow as pa
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, parse
 from davinci_forces.logs.lines import GZIP, Lines, decode
-from davinci_forces.logs.log import Block, Log, Options, read_ahead
+from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, Unclear, both_readings, number_in, split_cells
+from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, both_readings, number_in, split_cells
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 from davinci_forces.maths.arrays import Array
 
@@ -35,7 +35,7 @@ def read(path: Path, options: Options) -> Log:
     head = decode(lines.head(), lines.encoding if not lines.mark else None).split("\n")
     try:
         dialect = find_dialect([line.rstrip("\r") for line in head], options)
-    except Unclear as problem:
+    except BadContent as problem:
         raise BadLog(f"{path}: {problem}") from None
     facts = {
         "delimiter": NAMES.get(dialect.delimiter, dialect.delimiter),
@@ -49,7 +49,7 @@ def read(path: Path, options: Options) -> Log:
     return TextLog(
         path, "text", shown, time=time, started=dated.first_moment if dated else "",
         zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
-        encoding=options.encoding, warnings=list(dialect.remarks),
+        encoding=options.encoding, warnings=list(dialect.remarks), unread=dialect.unread,
     )  # fmt: skip
 
 
@@ -60,12 +60,7 @@ class TextLog(Log):
     dialect: Dialect = field(kw_only=True)
     encoding: str | None = None
 
-    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        for i, why in self.dialect.unread.items():
-            if (name := self.dialect.channels[i].name) in names:
-                raise BadLog(f"{self.path}: column {i} ({name}) {why}")
-        self._restart(names)
+    def _read(self, names: Sequence[str]) -> Iterator[Block]:
         yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
 
@@ -134,14 +129,12 @@ class _Reading:
             return None
         if dialect.delimiter == " ":
             block = b"\n".join(b" ".join(row.split()) for row in block.split(b"\n"))
-        delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), self.width
+        form = self.width, dialect.delimiter.encode(), dialect.decimal.encode()
         try:
-            cells = parse(
-                block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times, missing=missing
-            )
+            cells = parse(block, *form, self.wanted, quoted=dialect.quoted, times=self.times, missing=missing)
         except UNREADABLE:
             return None
-        return None if dialect.has_trailing and cells.nulls[width - 1] < cells.rows else cells
+        return None if dialect.has_trailing and cells.nulls[self.width - 1] < cells.rows else cells
 
     def _row_by_row(self, first: int, block: bytes) -> Cells:
         """Parse any other block: keep only the wanted cells, and locate a cell that is not a number."""
@@ -155,9 +148,8 @@ class _Reading:
                     lines.append(line)
         by_column = {i: [row[i] for row in rows] for i in self.wanted}
         nulls = {i: sum(cell in ABSENT for cell in cells) for i, cells in by_column.items()}
-        return Cells(
-            len(rows), {i: self._converted(i, lines, cells) for i, cells in by_column.items()}, nulls, texts=[]
-        )
+        columns = {i: self._converted(i, lines, cells) for i, cells in by_column.items()}
+        return Cells(len(rows), columns, nulls, texts=[])
 
     def _converted(self, column: int, lines: Sequence[int], cells: Sequence[str]) -> Array:
         """Convert the cells of a column, which stand in these lines, to numbers."""

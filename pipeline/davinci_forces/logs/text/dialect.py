@@ -1,19 +1,19 @@
-"""Detect the format of a text log from its first lines and the options."""
+"""Detect the format of a text log from its first lines and the options: its rows, and names and units above them."""
 
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.logs.cells import MISSING
-from davinci_forces.logs.log import Channel, Options, renaming_remarks, unique
-from davinci_forces.logs.text.header import read_header
+from davinci_forces.logs.log import BadContent, Channel, Options, renaming_remarks, unique
 from davinci_forces.logs.text.marks import find_marks
-from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclear, both_readings, split_cells
+from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, both_readings, split_cells
 from davinci_forces.logs.text.stamps import Stamps, both_dates, stamps_of
-from davinci_forces.maths.units import since_1970
+from davinci_forces.maths.units import UNSIZED, canonical, measures, since_1970, split_ratio, unit_in
 
 SAMPLE_LINES = 1000  # lines from which the format is found
 ABSENT = MISSING | {""}
@@ -24,6 +24,9 @@ COUNTED_CELLS = 50  # from which a date as a count is recognised
 STEP_IN_DAYS = 2e-5  # a shorter sampling time is 1.7 s in days; in seconds, no robot samples so fast
 TICKS = ((1.25e17, 1.6e17), (6.3e17, 6.7e17))  # of 100 ns in the same years, as Windows and .NET count them
 MEASURED = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*[^\W\d_°%]+[^\d]*|[+-]?\d+(?:[.,]\d+)?\s*[°%]")
+BRACKETED = re.compile(r"\s*[\[(].*[\])]\s*")
+DELIMITERS = (r"\t+", ";", ",", r"\|", r"\s{2,}", r"\s+")  # of a header with another delimiter than the rows
+COUNTING = re.compile(r"[+-]?[\d.,]+([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Dialect:
     quoted: bool  # whether cells are quoted
     framed: bool  # whether rows begin or end with a pipe
     marked: bool  # whether rows begin with the mark of a comment
-    unread: dict[int, str]  # why columns of text are read neither as numbers nor as times
+    unread: dict[str, str]  # by channel of text, why it is read neither as numbers nor as times
     remarks: tuple[str, ...]  # on changed names, units by the size of numbers, and unread columns
 
     @property
@@ -50,14 +53,23 @@ class Dialect:
         return len(self.names) > 1 and not self.names[-1]
 
 
+class Header(NamedTuple):
+    """Names and units of all columns, empty where there are none."""
+
+    names: list[str]
+    aliases: list[str]  # names as written, where these hold the unit after a slash
+    units: list[str]
+    preamble: list[str]  # the other lines
+
+
 def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
-    """Find the format of a file from its first lines; raises Unclear if marks or columns have two readings."""
+    """Find the format of a file from its first lines; raises BadContent if marks or columns have two readings."""
     lines = _unfolded(lines[:SAMPLE_LINES])
     if lines and (separator := SEPARATOR_LINE.fullmatch(lines[0])):
         options, lines = replace(options, delimiter=options.delimiter or separator[1]), ["", *lines[1:]]
     rows = [line for line in lines if line.strip()]
     if not rows:
-        raise Unclear("it holds no rows; record it again, or take it out of study.toml")
+        raise BadContent("it holds no rows; record it again, or take it out of study.toml")
     body = _body(rows)
     delimiter, decimal = find_marks(rows, body, options)
     framed = delimiter == "|" and any(map(FRAME.search, body))
@@ -78,15 +90,15 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
     described = zip(unique(header.names), units, kinds, header.aliases, strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
-    remarks = unread | {i: f"holds {columns[i][-1]}, the date as a count: its unit is {counted[i]}" for i in counted}
+    counts = {i: f"holds {columns[i][-1]}, the date as a count: its unit is {unit}" for i, unit in counted.items()}
+    remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in (unread | counts).items()}
     return Dialect(
-        delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first, unread=unread,
+        delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
         header_lines=frozenset(line.strip() for line in lines[:first] if line.strip()),
         names=tuple(header.names) if any(header.names) else (), preamble=tuple(header.preamble), framed=framed,
-        quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])), remarks=(
-            *renaming_remarks(header.names, [channel.name for channel in channels]),
-            *(f"column {i} ({channels[i].name}) {remark}" for i, remark in remarks.items()),
-        ),
+        quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])),
+        unread={channels[i].name: remarks[i] for i in unread},
+        remarks=(*renaming_remarks(header.names, [channel.name for channel in channels]), *remarks.values()),
     )  # fmt: skip
 
 
@@ -137,7 +149,7 @@ def _first_row(
         dated = all(cells[column][:1].isdecimal() for column in stamps if column < len(cells) and cells[column])
         if len(cells) == len(kinds) and dated and (measured or stamps) and all(map(number.fullmatch, measured)):
             return i
-    raise Unclear("none of its lines is a row of numbers; set `delimiter` and `decimal` for this log in study.toml")
+    raise BadContent("none of its lines is a row of numbers; set `delimiter` and `decimal` for this log in study.toml")
 
 
 def _are_numbers_of_columns(cells: Sequence[str], columns: Sequence[Sequence[str]], decimal: str) -> bool:
@@ -186,3 +198,80 @@ def _why_text(cells: Sequence[str]) -> str:
     if MEASURED.fullmatch(cell):
         return f"holds {cell!r}, a number and its unit in one cell; export the numbers alone"
     return ""
+
+
+def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options) -> Header:
+    """Read the lines before the first row; `columns` are the cells of the columns below.
+
+    Raises BadContent if the last line has other columns than the rows, or holds numbers and text.
+    """
+    width = len(columns)
+    rows = [_fitted(line, columns, delimiter) for line in lines]
+    fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
+    remarks = [i for i, line in enumerate(lines) if COMMENT.match(line) or RULER.fullmatch(line)]
+    below = [i for i in range((fits or [-1])[-1] + 1, len(rows)) if i not in remarks]
+    free = bool(fits) and delimiter == " "  # blanks also separate the words of a remark
+    odd = next((rows[i] for i in below if len(rows[i]) > 1 and (not free or _are_units(rows[i]))), None)
+    if odd or (below and options.header and not fits):
+        raise BadContent(_other_columns(odd or rows[-1], width))
+    of_units = next((i for i in fits[::-1] if len(fits) > 1 and _are_units(rows[i])), None)
+    above = [i for i in fits if of_units is None or i < of_units] or [i for i in fits if i != of_units]
+    distinct = (i for i in above[::-1] if len({*filter(None, rows[i])}) == len([*filter(None, rows[i])]))
+    of_names = next(distinct, above[-1] if above else None)  # a row of types repeats itself
+    names = [] if of_names is None else rows[of_names]
+    if any(COUNTING.fullmatch(cell) for cell in names) and options.header is None:
+        raise BadContent(
+            f"a line before the rows holds numbers and text ({', '.join(names[:6])}); correct the cell, or set "
+            "`header = true` for this log in study.toml if these are names"
+        )
+    units = [cell.strip("[](){} ") for cell in rows[of_units]] if of_units is not None else [""] * width
+    cells_above = zip(units, *(rows[i] for i in above[::-1]), strict=True) if above else ()
+    units = [unit or next(filter(None, map(unit_in, cells)), "") for unit, *cells in cells_above] or units
+    preamble = [line for i, line in enumerate(lines) if i not in (of_names, of_units)]
+    return _split(names or [""] * width, units, preamble)
+
+
+def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
+    """Take the units out of the names: where one name is a quantity over its unit, all of that form are."""
+    ratios = [split_ratio(name) for name in names]
+    if any(unit for _, unit in ratios):
+        over = (name.partition(" / ") for name in names)
+        ratios = [ratio if ratio[1] else (name, unit) for ratio, (name, _, unit) in zip(ratios, over, strict=True)]
+    stems = [stem for stem, _ in ratios]
+    aliases = [name if name != stem else "" for name, stem in zip(names, stems, strict=True)]
+    stated = [unit or ratio[1] for unit, ratio in zip(units, ratios, strict=True)]
+    return Header(stems, aliases, stated, preamble)
+
+
+def _fitted(line: str, columns: Sequence[Sequence[str]], delimiter: str) -> list[str]:
+    """Split a line of the header into as many cells as the rows have, if it has them with any delimiter."""
+    width = len(columns)
+    text = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
+    cells = split_cells(text, delimiter)
+    if len(cells) == width + 1 and cells[-1] in ("", "Comment"):
+        return cells[:-1]
+    if len(cells) == width - 1 and not all(filled := (any(columns[0]), any(columns[-1]))):
+        return [*cells, ""] if filled[0] else ["", *cells]  # rows end or begin in a delimiter
+    splits = ([cell.strip() for cell in re.split(pattern, text.strip())] for pattern in DELIMITERS)
+    fitting = (split for split in splits if len(split) == width > 1 and all(split))
+    return cells if '"' in text or (len(cells) == width and delimiter != " ") else next(fitting, cells)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    sized = [bool(BRACKETED.fullmatch(cell) or measures(canonical(cell))) for cell in filled]
+    words = (cell.lower().strip(":").removesuffix("s") for cell in filled)
+    known = (word in UNSIZED or word in ("-", "–", "1", "unit", "einheit") for word in words)
+    return any(sized) and all(a or b for a, b in zip(sized, known, strict=True))
+
+
+def _other_columns(cells: Sequence[str], width: int) -> str:
+    short = (
+        "which one has no name is not known, the first, as a number of the row, or another: name all (in R by "
+        "write.csv(..., row.names = FALSE), in pandas by to_csv(index=False))"
+    )
+    remedy = short if len(cells) == width - 1 else "correct it"
+    return (
+        f"the header names {len(cells)} columns ({', '.join(cells[:6])}), but rows have {width}; {remedy}, "
+        "or set `header = false` for this log in study.toml"
+    )

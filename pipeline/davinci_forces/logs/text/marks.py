@@ -3,8 +3,8 @@
 import re
 from collections.abc import Sequence
 
-from davinci_forces.logs.log import Options
-from davinci_forces.logs.text.rows import NUMBERS, TWO_READINGS, Unclear, both_readings, split_cells
+from davinci_forces.logs.log import BadContent, Options
+from davinci_forces.logs.text.rows import NUMBERS, TWO_READINGS, both_readings, split_cells
 from davinci_forces.logs.text.stamps import is_time
 
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " ", "pipe": "|", "\\t": "\t"}
@@ -24,7 +24,7 @@ EXPORTS = {
 
 
 def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tuple[str, str]:
-    """Find the two marks that give the most numbers; raises Unclear if none does, or one has two readings."""
+    """Find the two marks that give the most numbers; raises BadContent if none does, or one has two readings."""
     occurring = [mark for mark in CANDIDATES if mark == "\t" or any(mark in line for line in body)]
     delimiters = [NAMED.get(options.delimiter, options.delimiter)] if options.delimiter else occurring
     decimals = (options.decimal,) if options.decimal else (".", ",")
@@ -37,13 +37,13 @@ def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tu
     if not scores or 2 * scores[best][0] < len(body):
         start = rows[0].lstrip()
         hint = next((f"; {hint}" for mark, hint in EXPORTS.items() if start.startswith(mark)), "")
-        raise Unclear(
+        raise BadContent(
             "no delimiter (tab, semicolon, comma, pipe, blanks) splits its lines into columns of numbers; set "
             f"`delimiter` and `decimal` for this log in study.toml, or take it out{hint}"
         )
     if best == (",", ".") and not options.delimiter and not options.decimal:
         if scores["\t", "."][:2] == scores[best][:2]:
-            raise Unclear(COMMA.format("or separate thousands"))  # for whole lines are numbers as well
+            raise BadContent(COMMA.format("or separate thousands"))  # for whole lines are numbers as well
         return _comma(rows, body)
     if best[0] != "," and not options.decimal:
         _require_decimal_mark(cells[best[0]], best[1])
@@ -54,7 +54,7 @@ def _require_decimal_mark(cells: Sequence[Sequence[str]], mark: str) -> None:
     """Refuse numbers whose marks may all be thousands separators."""
     marked = [cell for row in cells for cell in row if mark in cell and NUMBERS[mark].fullmatch(cell)]
     if marked and all(map(TWO_READINGS[mark].fullmatch, marked)):
-        raise Unclear(f"{marked[0]!r} {both_readings(marked[0])}")
+        raise BadContent(f"{marked[0]!r} {both_readings(marked[0])}")
 
 
 def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int, bool, int]:
@@ -101,5 +101,5 @@ def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:
     )
     spaced = all(re.search(r",\s", line) and re.search(r",\S", line) for line in body)
     if widths == {2} or (pairs and (uneven or spaced or 2 * len(first) == len(cells[-1]))):
-        raise Unclear(COMMA.format("the decimal mark, or both"))
+        raise BadContent(COMMA.format("the decimal mark, or both"))
     return ",", "."

@@ -19,10 +19,6 @@ NUMBERS = {
 TWO_READINGS = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}{re.escape(mark)}\d{{3}}") for mark in ".,"}
 
 
-class Unclear(ValueError):
-    """The format is ambiguous or unknown; the message says which option to set, or what to export."""
-
-
 def split_cells(line: str, delimiter: str) -> list[str]:
     """Split a line into cells, without the blanks and quotes around them."""
     cells = line.split() if delimiter == " " else line.split(delimiter)

@@ -72,9 +72,8 @@ class Stamps:
         text = pc.replace_substring(pc.utf8_trim_whitespace(cells), ",", ".")
         late = np.zeros(len(text))  # [s] of the second half of the day, and of its first hour, which is written 12
         if self.has_halves:
-            after, noon = (
-                pc.fill_null(pc.match_substring_regex(text, p), False) for p in (r"(?i)p\.?m", r"(?:^|[T ])12:")
-            )
+            matches = (pc.match_substring_regex(text, pattern) for pattern in (r"(?i)p\.?m", r"(?:^|[T ])12:"))
+            after, noon = (pc.fill_null(match, False) for match in matches)
             late = 12 * HOUR * (after.to_numpy().astype(float) - noon.to_numpy())
             text = pc.replace_substring_regex(text, r"(?i)\s*[ap]\.?m\.?$", "")
         for pattern, iso in REWRITTEN[self.pattern]:

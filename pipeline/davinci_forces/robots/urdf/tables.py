@@ -21,8 +21,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias, tensors
 from davinci_forces.maths.mechanics.placed import transform
 from davinci_forces.robots.robot import MOST_LINKS
-from davinci_forces.toml import TomlFile, excerpt
-from davinci_forces.toml.ranges import unlikely
+from davinci_forces.toml import TomlFile, excerpt, unlikely
 
 MAX_BYTES = 4_000_000  # a description has a few thousand lines; shapes are in separate files
 TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read; keep shapes in separate files"

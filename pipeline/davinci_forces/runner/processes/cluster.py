@@ -14,7 +14,7 @@ from uuid import uuid4
 
 from davinci_forces.errors import BadRequest, install
 from davinci_forces.runner.execution import Outcome, perform
-from davinci_forces.runner.fingerprints.code import package_fingerprint
+from davinci_forces.runner.fingerprint import package_fingerprint
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic

@@ -12,14 +12,7 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.files import read_bytes, write_bytes
-from davinci_forces.maths.estimation.drift import (
-    MIN_VALUES_TREND,
-    control_limits,
-    holm,
-    outlier_probabilities,
-    scatter,
-    trend,
-)
+from davinci_forces.maths.estimation import drift
 from davinci_forces.report.campaign.page import render_campaign
 from davinci_forces.report.campaign.studies import (
     DAY,
@@ -113,13 +106,14 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     for row in series:
         if len(row.value) < 2 or not (np.isfinite(row.value).all() and np.isfinite(row.std).all()):
             continue
-        line = trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
+        line = drift.trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
         if line is not None:
             slopes[row.key] = Slope(line.slope, line.std)
             tests["drift", row.key, 0] = line.p
-        tests["scatter", row.key, 0] = scatter(row.value, row.std)
-        tests |= {("outlier", row.key, i): p for i, p in enumerate(outlier_probabilities(row.value, row.std).tolist())}
-    rejections = holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
+        tests["scatter", row.key, 0] = drift.scatter(row.value, row.std)
+        probabilities = drift.outlier_probabilities(row.value, row.std).tolist()
+        tests |= {("outlier", row.key, i): p for i, p in enumerate(probabilities)}
+    rejections = drift.holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
     significant = [test for test, rejected in zip(tests, rejections, strict=True) if rejected]
     drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
     odd = {where: tuple(i for k, at, i in significant if k == "outlier" and at == where) for _, where, _ in significant}
@@ -133,9 +127,9 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
 def limits_of(row: Series, odd: tuple[int, ...]) -> ControlLimits | None:
     """The control limits of a series, without the studies that stand out; None if too few have standard errors."""
     value, std = (np.delete(column, odd) for column in (row.value, row.std))
-    if len(value) < MIN_VALUES_TREND or not np.isfinite([value, std]).all():
+    if len(value) < drift.MIN_VALUES_TREND or not np.isfinite([value, std]).all():
         return None
-    return ControlLimits(*control_limits(value, std, IN_CONTROL))
+    return ControlLimits(*drift.control_limits(value, std, IN_CONTROL))
 
 
 def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:

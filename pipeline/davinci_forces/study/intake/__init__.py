@@ -6,7 +6,6 @@ from itertools import chain
 
 import numpy as np
 
-from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import FILLED_IN
 from davinci_forces.logs.log import Block, Channel, Log
 from davinci_forces.maths.arrays import Booleans
@@ -16,6 +15,7 @@ from davinci_forces.maths.units import SI, UNITS, canonical, measures, size, uni
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
+from davinci_forces.study.channels import ALTERNATIVES
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
 MAX_VALUE = 1e30  # of a sample in the unit of its channel; no quantity of an arm is larger, nor are times in ns
@@ -38,13 +38,10 @@ def touch_of(reading: "Intake", block: Block, t: Column, selected: Booleans) -> 
         for name, quantity in TOUCH_COLUMNS.items()
     }
     return Touch(
-        log=reading.entry.name,
-        role=reading.entry.role,
-        sample=(reading.rows + np.arange(len(t)))[selected],
-        push=_pushes(reading, block, len(t))[selected],
-        t=(t if reading.clocks.all_timed else unknown)[selected],
+        log=reading.entry.name, role=reading.entry.role, sample=(reading.rows + np.arange(len(t)))[selected],
+        push=_pushes(reading, block, len(t))[selected], t=(t if reading.clocks.all_timed else unknown)[selected],
         **{name: column[selected] for name, column in columns.items()},
-    )
+    )  # fmt: skip
 
 
 def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
@@ -54,8 +51,8 @@ def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
     numbers = reading.to_si(block, "push")
     odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
     if len(odd):
-        raise BadLog(
-            f"{reading.log.path}: channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
+        raise reading.log.bad(
+            f"channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
             f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push must be whole; name another "
             "channel, or leave push out and the pushes are detected"
         )
@@ -88,14 +85,11 @@ class Intake:
             self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
         )
         if not self.clocks.all_timed and self.entry.needs_clock and not self.clocks.are_several:
-            raise BadLog(
-                f"{self.log.path}: the log has no clock; name its time channel in [log.channels], "
-                "or give rate = ... [Hz]"
-            )
+            raise self.log.bad("the log has no clock; name its time channel in [log.channels], or give rate = ... [Hz]")
         has_seconds = self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)
         if not self.clocks.all_timed and has_seconds:
-            raise BadLog(
-                f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
+            raise self.log.bad(
+                "the log has no clock, but skip, until and contact windows are in seconds; give "
                 'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
             )
         self.names = list(dict.fromkeys([*used, *([self.clocks.time] if self.clocks.time else [])]))
@@ -108,8 +102,8 @@ class Intake:
         if misread or source.scale != 1.0:  # the stated unit is the unit after scaling
             log_unit = ""
         if source.unit and log_unit in UNITS and log_unit != source.unit:
-            raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
+            raise self.log.bad(
+                f"channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
                 f"{source.unit!r}; correct the unit of {source.quantity} in study.toml, or leave it out"
             )
         unit = source.unit or log_unit or SI[source.measures]
@@ -118,8 +112,8 @@ class Intake:
         if measures(unit) != source.measures:
             what = f"measures {measures(unit)}" if unit in UNITS else "is an unknown unit"
             fitting = ", ".join(u for u in UNITS if measures(u) == source.measures)
-            raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
+            raise self.log.bad(
+                f"channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
                 f"{source.quantity} needs {source.measures}; give its unit in study.toml, one of {fitting}"
             )
         return size(unit)
@@ -144,23 +138,15 @@ class Intake:
         selected = t - first >= self.entry.skip - 1e-9
         for name in self.entry.joints:
             joint = self.robot.joint(name)
-            q, dq, tau = (
-                self.of_joint(block, joint, either) for either in (("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i"))
-            )
+            q, tau, dq = (self.of_joint(block, joint, either) for either, _ in ALTERNATIVES)
             assert q is not None
             assert tau is not None
             yield Recording(
-                log=self.entry.name,
-                joint=name,
-                role=self.entry.role,
-                rate=self.clock.rate,
-                velocity="derived" if dq is None else "logged",
-                t=(t - first)[selected],
-                q=q[selected],
-                dq=np.zeros(int(selected.sum())) if dq is None else dq[selected],
-                tau=tau[selected],
+                log=self.entry.name, joint=name, role=self.entry.role, rate=self.clock.rate,
+                velocity="derived" if dq is None else "logged", t=(t - first)[selected], q=q[selected],
+                dq=np.zeros(int(selected.sum())) if dq is None else dq[selected], tau=tau[selected],
                 filled=block[FILLED_IN][selected].astype(np.int64),
-            )
+            )  # fmt: skip
         if touch := touch_of(self, block, t - first, selected & (block[FILLED_IN] == 0)):
             yield touch
         self.rows += len(t)
@@ -207,8 +193,8 @@ class Intake:
         if not len(bad):
             return
         row = self.rows + int(bad[0])
-        raise BadLog(
-            f"{self.log.path}: channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
+        raise self.log.bad(
+            f"channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
             f"of the {len(values)} rows read with it lack a number; record the log again, or save the part before this "
             "row as a separate log"
         )
@@ -217,8 +203,8 @@ class Intake:
         """Refuse a clock that stands still or goes back, with the row."""
         clock = self.clock
         if clock.backward or clock.repeated:
-            raise BadLog(
-                f"{self.log.path}: time does not increase at row {clock.bad_row} (counted from 0): "
+            raise self.log.bad(
+                f"time does not increase at row {clock.bad_row} (counted from 0): "
                 f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
                 "or give rate = ... [Hz] to count samples instead"
             )

@@ -6,9 +6,8 @@ from itertools import chain
 
 import numpy as np
 
-from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import Alignment, Follower, TimedBlock, align
-from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log
+from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log, row_count
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.units import since_1970
 from davinci_forces.maths.units import size as size_of
@@ -45,8 +44,8 @@ class UsedClocks:
     def __post_init__(self) -> None:
         groups = [part for time, names in self.log.by_clock(self.used).items() for part in self._split(time, names)]
         if self.time_source and not any(group.is_stated for group in groups):
-            raise BadLog(
-                f"{self.log.path}: time = {self.time_source.channel!r} is not the clock of any channel that is used; "
+            raise self.log.bad(
+                f"time = {self.time_source.channel!r} is not the clock of any channel that is used; "
                 "the log has a clock for these, so leave time out of [log.channels]"
             )
         self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
@@ -59,8 +58,8 @@ class UsedClocks:
         for group in () if self.entry.rate else self.groups:
             names = [self.log.find(name).name for name in group.names]
             if not group.is_stated and all(name in lent and lent[name] not in names for name in names):
-                raise BadLog(
-                    f"{self.log.path}: the log states no sampling time of channel {names[0]!r}, only of "
+                raise self.log.bad(
+                    f"the log states no sampling time of channel {names[0]!r}, only of "
                     f"{lent[names[0]]!r}, which is not used; give rate = ... [Hz], or name its time in [log.channels]"
                 )
 
@@ -121,8 +120,8 @@ class UsedClocks:
                 return
         if not self.all_timed:
             without = next(group for group in self.groups if not self._is_known(group))
-            raise BadLog(
-                f"{self.log.path}: channel {without.names[0]!r} has no clock, but other channels that are used have "
+            raise self.log.bad(
+                f"channel {without.names[0]!r} has no clock, but other channels that are used have "
                 "clocks; name its time in [log.channels], give rate = ... [Hz] for all channels, or leave it out"
             )
         logs = [self.log.independent_copy() for _ in self.groups]
@@ -130,7 +129,7 @@ class UsedClocks:
         first, *others = (self._filled(blocks, group) for blocks, group in zip(timed, self.groups, strict=True))
         followers = {_listed(group.names): follower for group, follower in zip(self.groups[1:], others, strict=True)}
         try:
-            for t, block in align(first, followers, self.done, lambda why: BadLog(f"{self.log.path}: {why}")):
+            for t, block in align(first, followers, self.done, self.log.bad):
                 yield block | {ALIGNED: t}
         finally:
             self._noticed(logs)
@@ -149,7 +148,7 @@ class UsedClocks:
     def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:
         rows = 0
         for block in log.blocks(list(dict.fromkeys((*group.names, *([group.time] if group.time else []))))):
-            count = len(next(iter(block.values())))
+            count = row_count(block)
             yield self.times(block, rows, count, group), block
             rows += count
 
@@ -188,8 +187,8 @@ class UsedClocks:
             unit = since_1970(size) if MAX_SECONDS < size < np.inf else "s"
             stated = self.log.find(name).unit or (self.time_source.unit if self.time_source else "")
             if not unit or (unit != "s" and stated):
-                raise BadLog(
-                    f"{self.log.path}: channel {name!r} holds times of {size:.4g} s, which is no date; correct the "
+                raise self.log.bad(
+                    f"channel {name!r} holds times of {size:.4g} s, which is no date; correct the "
                     "unit of time in study.toml, or name another time channel"
                 )
             self.units[name] = size_of(unit)

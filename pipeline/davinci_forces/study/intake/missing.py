@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import FILLED_IN, TimedBlock
 from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array, Booleans
@@ -107,8 +106,8 @@ class MissingSamples:
             end = channel.at_end if log.cut else 0
             if channel.count - end > MAX_MISSING * (channel.rows - end):
                 what = "has no sample" if log.nulls.get(name, 0) else "holds nan"
-                raise BadLog(
-                    f"{log.path}: channel {name!r} {what} at row {channel.first} (counted from 0), and {channel.count} "
+                raise log.bad(
+                    f"channel {name!r} {what} at row {channel.first} (counted from 0), and {channel.count} "
                     f"of its {channel.rows} rows lack a number, more than {MAX_MISSING:.0%}, in no regular rhythm; "
                     "record the log again, or leave the channel out"
                 )

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.errors import BadLog
 from davinci_forces.files import visible
 from davinci_forces.maths.signals.clock import FILLED, GAP
 from davinci_forces.records import LogSummary
@@ -22,7 +21,7 @@ def summary(intake: Intake) -> LogSummary:
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
         until = f" and those after {entry.until:g} s left out" if intake.ended else ""
         why = f"{clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
-        raise BadLog(f"{log.path}: {why}; record more, or take the log out of study.toml")
+        raise log.bad(f"{why}; record more, or take the log out of study.toml")
     feeds: dict[str, list[str]] = {}
     for quantity, channel in intake.channels.items():
         feeds.setdefault(channel.name, []).append(quantity)
@@ -34,18 +33,8 @@ def summary(intake: Intake) -> LogSummary:
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
     rate, duration, jitter, longest_gap = times if intake.clocks.all_timed else (float("nan"),) * 4
     return LogSummary.like(
-        clock,
-        log=entry.name,
-        role=entry.role,
-        format=log.format,
-        files=entry.files,
-        started=log.started,
-        zone=log.zone,
-        rows=clock.samples,
-        rate=rate,
-        duration=duration,
-        jitter=jitter,
-        longest_gap=longest_gap,
+        clock, log=entry.name, role=entry.role, format=log.format, files=entry.files, started=log.started,
+        zone=log.zone, rows=clock.samples, rate=rate, duration=duration, jitter=jitter, longest_gap=longest_gap,
         dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
@@ -54,7 +43,7 @@ def summary(intake: Intake) -> LogSummary:
         feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
         nulls=np.array([log.nulls.get(name, 0) for name in names]),
         nans=np.array([log.nans.get(name, 0) for name in names]),
-    )
+    )  # fmt: skip
 
 
 def remarks(intake: Intake) -> Iterator[str]:
@@ -70,9 +59,8 @@ def remarks(intake: Intake) -> Iterator[str]:
     for start, end in entry.contact:
         if start >= clock.last - clock.first or end <= entry.skip:
             yield (
-                f"the contact window {start:g} to {end:g} s lies outside the log, which goes from "
-                f"{entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
-                "sample"
+                f"the contact window {start:g} to {end:g} s lies outside the log, which goes from {entry.skip:g} to "
+                f"{clock.last - clock.first:g} s; contact times count from the log's first sample"
             )
     if entry.until is not None and not intake.ended and clock.last - clock.first < entry.until - GAP / clock.rate:
         yield (

@@ -1,1 +1,0 @@
-"""Hashes of all that the outputs of a task depend on: values, code, and the declarations of records."""
