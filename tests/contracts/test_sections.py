@@ -58,6 +58,7 @@ from davinci_forces.report.sections import (
     joints,
     noise,
     parts,
+    prediction,
     runs,
     summary,
     tissue,
@@ -410,6 +411,26 @@ def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: C
     [wrong] = trusts(full, hand_roll=1.0)
     [(_, text)] = summary.looks_at_band(full, replace(wrong, space=narrow.space))
     assert "it covers only 30 % of free-space samples. See" in text
+
+
+def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):
+    [contact, *_] = full.catalogue.records(Contact)
+    contacts = [replace(contact, joint=joint) for joint in ("instrument_slide", "hand_pitch", "hand_roll")]
+    order = ["Hand roll", "Hand pitch", "Instrument slide"]
+    assert [panel.title for panel in contacts_section.peaks(full, contacts).panels] == order
+    levels = contacts_section.alarm_levels(full, contacts)
+    assert sorted(order, key=lambda joint: levels.index(joint.lower())) == order
+
+
+def test_scores_of_logs_whose_contacts_are_not_stated_are_said_to_hold_them(full: Context):
+    predictions = full.catalogue.records(Prediction)
+    assert "Contacts" not in prediction.every_score(full, predictions).caption
+    logs = tuple(replace(log, contact=(), free=()) if log.role == "contact" else log for log in full.study.logs)
+    unknown = replace(full, study=replace(full.study, logs=logs))
+    touched = dict.fromkeys(p.log for p in predictions if p.role == "contact")
+    assert touched
+    caption = prediction.every_score(unknown, predictions).caption
+    assert caption.endswith(f"Contacts that the study does not state are in those of {', '.join(touched)}.")
 
 
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):
