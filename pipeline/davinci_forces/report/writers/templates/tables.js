@@ -43,7 +43,7 @@ function prepareTable(region) {
 
 // Fade the right edge of a table that goes on beyond it, so that a reader knows to scroll.
 function fadeWhereCut(scroll) {
-  const update = () => scroll.classList.toggle("cut", scroll.scrollWidth - scroll.clientWidth - scroll.scrollLeft > 1);
+  const update = () => scroll.classList.toggle("cut", scroll.scrollWidth - scroll.clientWidth - scroll.scrollLeft > 4); // px
   scroll.addEventListener("scroll", update, { passive: true });
   new ResizeObserver(update).observe(scroll);
 }
