@@ -140,6 +140,19 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     assert "--all" not in said
 
 
+def test_values_come_before_standard_errors_and_what_repeats_another_change_comes_last(tmp_path):
+    fits = [f"fit.roll.chosen.{estimator}.inertia" for estimator in ("ridge", "consistent")]
+    before = {f"{fit}.std_noise": 1.0 for fit in fits} | dict.fromkeys(fits, (1.0, 0.1))
+    before |= {"weight.a.roll.fit_std": 1.0, "noise.a.roll.sigma": (1.0, 0.1)}
+    after = {key: 5.0 if key.endswith(("std_noise", "_std")) else (2.0, 0.1) for key in before}
+    said = call("compare", results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after))
+    rows = [line.split() for line in said.split("\n\n")[1].splitlines()[2:]]
+    listed = [next(word for word in row if "." in word and "roll" in word) for row in rows]
+    assert listed == [fits[0], "noise.a.roll.sigma", f"{fits[0]}.std_noise", "weight.a.roll.fit_std",
+                      fits[1], f"{fits[1]}.std_noise"]  # fmt: skip
+    assert "changed: 2 of model, 1 of noise, 3 of standard errors" in said
+
+
 def test_two_robots_are_told_apart(tmp_path):
     folders = [tmp_path / robot for robot in ("davinci", "ur10e")]
     for i, folder in enumerate(folders):

@@ -24,7 +24,7 @@ from davinci_forces.maths.estimation.least_squares import (
     triangle,
     uncertain_combinations,
 )
-from davinci_forces.records import Diagnostic, Identifiability
+from davinci_forces.records import Diagnostic, Identifiability, Spectrum
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import unidentified_parameters
 from davinci_forces.robots.davinci import ROBOT
@@ -163,6 +163,17 @@ def test_an_effort_that_its_own_terms_do_not_describe_is_said_to_be_one():
     assert "explain 0 % of" in hardly_described(ROLL, -3.0, [])
     assert "pan moves in the same logs" in hardly_described(ROLL, 0.26, ["pan"])
     assert "explain 26 % of the effort's variance: check" in hardly_described(ROLL, 0.26, [])
+
+
+def test_a_fit_to_a_motion_that_lacks_a_large_harmonic_does_not_blame_the_channels():
+    signal = arm.signal("hand_roll")
+    noise = replace(signal, tau=np.random.default_rng(0).normal(size=len(signal.tau)))
+    for share, is_blamed in ((0.35, False), (0.02, True)):
+        cut = Spectrum(signal.log, "hand_roll", 2, np.arange(4.0), np.array([0.0, 1.0, 0.5, share]))
+        other = replace(cut, joint="hand_pitch", amplitude=np.array([0.0, 1.0, 0.5, 0.9]))
+        records = fit.run([trajectory(noise)], [], arm.ARM, [cut, other], lowpass=17.0)
+        texts = [text for record in records if isinstance(record, Diagnostic) for text in record.text]
+        assert any("are channels of one joint" in text for text in texts) == is_blamed
 
 
 def test_only_joints_that_move_in_the_same_logs_are_others():

@@ -178,7 +178,7 @@ REMARKS = {
     "degrees": r'0\.0175 times .* position in degrees\? write unit = "deg"',
     "counts": r"velocities reach .* degrees or counts\? write .* or the gear_ratio of a motor",
     "current": r"/hand_roll: the effort is 0 throughout; check the column",
-    "still": r": no joint moves, .*; check its channels, their units, and the clock, of 50 Hz",
+    "still": r": no joint moves of those that study.toml names, .*; name the channels of .*, and the clock, of 50 Hz",
     "one": r"\.lvm: 1 samples are too few, .*; record more",
     "two": r"/hand_roll: no segment without a gap holds 4 of the 2 samples; record more",
     "clock": r"\.lvm: time does not increase at row 250 .*: 4\.98 s, then 4\.98 s; name another time channel",

@@ -141,6 +141,39 @@ def test_a_position_of_which_no_word_names_a_joint_is_in_the_table_and_wanted_an
     said = new(table(tmp_path / "run.csv", t, 0.2 * q, effort(q, dq), 0.2 * q[:, :1], header=header))
     assert [line.count("joint of Swivel position") for line in said.splitlines() if "run.csv" in line] == [1]
     assert said.count("joint of") == 1
+    text = (tmp_path / "study.toml").read_text()
+    for quantity, name in (("q", "Swivel position"), ("tau", "Swivel torque")):
+        assert f'# "<joint>.{quantity}" = "{name}"  # MISSING: the joint\n' in text
+    assert '# "<joint>.<quantity>" = "Roll position setpoint"\n' in text
+
+
+@pytest.mark.parametrize("label", ["Ins", "Insertion", "insertion"])
+def test_the_slide_of_a_da_vinci_arm_is_known_by_its_short_name(tmp_path, label):
+    t, q, dq = motion(3)
+    names = [f"{joint} {quantity}" for quantity in ("pos", "curr (A)") for joint in ("Roll", "Pitch", label)]
+    new(table(tmp_path / "run.csv", t, q * [0.2, 0.2, 0.03], effort(q, dq), header=",".join(["Time", *names])))
+    assert 'robot = "davinci"' in (tmp_path / "study.toml").read_text()
+    assert held(tmp_path)["instrument_slide.q"] == f"{label} pos"
+    assert held(tmp_path)["instrument_slide.i"] == f"{label} curr (A)"
+
+
+@pytest.mark.parametrize("name", ["ins_weight150g", "mass_150g", "load-0p15kg", "payload_of_150_g"])
+def test_the_mass_is_read_wherever_the_name_states_it(tmp_path, name):
+    t, q, dq = motion(1)
+    new(table(tmp_path / f"{name}.csv", t, 0.2 * q, effort(q, dq), header="Time,Roll pos,Roll curr (A)"))
+    assert 'role = "weight"' in (tmp_path / "study.toml").read_text()
+    assert "# weight = { mass = 0.15, " in (tmp_path / "study.toml").read_text()
+
+
+def test_steps_back_and_gaps_do_not_change_the_rate_that_new_and_inspect_state(tmp_path):
+    t, q, dq = motion(1)
+    rows = np.arange(N)
+    stamps = {"gaps": t + 15.0 * (rows // 700), "again": t - t[N // 2] * (rows >= N // 2)}
+    for name, stamped in stamps.items():
+        file = table(tmp_path / name / "run.csv", stamped, 0.2 * q, effort(q, dq), header="X_Value,Roll pos,Roll curr")
+        assert f" at {RATE:g} Hz, " in call("inspect", file)
+        if name == "gaps":
+            assert f" {RATE:g} Hz " in new(file)
 
 
 def test_words_in_brackets_tell_the_joint_by_their_order_and_what_was_wanted_is_left_out(tmp_path):

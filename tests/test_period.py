@@ -354,6 +354,13 @@ def test_one_joint_that_breaks_says_that_time_passed():
     assert not steps(t, np.array([roll.q, broken]))
 
 
+def test_a_joint_at_rest_at_zero_beside_one_that_moves_is_no_division_by_zero():
+    signal = arm.signal("hand_roll", noise=0)
+    t = signal.t + np.where(np.arange(len(signal.t)) < 1000, 0.0, 3.0)
+    with np.errstate(all="raise"):
+        assert steps(t, np.array([signal.q, 0 * signal.q])) == steps(t, signal.q[None])
+
+
 def test_a_glitch_is_not_the_end_of_a_motion():
     t = np.arange(4000) / RATE
     x = waves(t, 8.0)

@@ -180,23 +180,25 @@ def test_many_reasons_of_one_step_are_one_line_with_the_first():
 
 
 def test_several_warnings_of_a_run_are_printed_once_more_at_its_end(capsys):
-    warnings = [f"ingest: warning: {i}" for i in range(runs.MAX_REPEATED + 2)]
+    warnings = [f"ingest: warning: {'abcdefghijklmnopq'[i]}" for i in range(runs.MAX_REPEATED + 2)]
     made = SimpleNamespace(warnings=warnings, console=console("normal"), ran=1, seconds={}, folders=None)
     made.ledger = SimpleNamespace(entry=lambda *_: None)
     runs.print_results(made, Path("raw/a"))
     said = capsys.readouterr().err.splitlines()
     assert said == [
-        f"the {len(warnings)} warnings of this run once more:",
+        "the warnings of this run once more, one of each kind:",
         *(f"  {line}" for line in warnings[: runs.MAX_REPEATED]),
         "  and 2 more, above",
     ]
     alike = [f"resample: warning: log-{i}/roll: it stands still from {i} s" for i in range(3)]
-    made.warnings = [*alike, warnings[0], "report: error: review.toml:3: right above"]
+    failed = "average: error: log-3: no joint moves"
+    made.warnings = [*alike, warnings[0], failed, "report: error: review.toml:3: right above"]
     runs.print_results(made, Path("raw/a"))
     assert capsys.readouterr().err.splitlines() == [
-        "the 4 warnings of this run once more:",
+        "the warnings and errors of this run once more, one of each kind:",
         f"  {alike[0]} (2 more remarks of this kind)",
         f"  {warnings[0]}",
+        f"  {failed}",
     ]
     made.warnings = warnings[:1]
     runs.print_results(made, Path("raw/a"))

@@ -480,6 +480,16 @@ hand_roll.q = "q"
 hand_roll.i = "Current"
 """
 )
+
+
+def test_a_weight_log_without_a_weight_is_named_with_what_to_write(tmp_path):
+    made = read(tmp_path, GOOD.replace("identification", "weight"))
+    [remark] = made.remarks
+    assert remark.startswith(f"{tmp_path / 'study.toml'}:6: log 'a' has the role weight, but ")
+    assert "write weight = { mass = <kg, if known>, moves_with = " in remark
+    assert not read(tmp_path, GOOD.replace('"identification"', f'"weight"\n{HANGS}')).remarks
+
+
 HANGS = 'weight = { moves_with = "5", position = [0, 0.1, 0.2] }'
 
 

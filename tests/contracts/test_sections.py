@@ -21,6 +21,7 @@ from davinci_forces.records import (
     LogSummary,
     PeriodResidual,
     Prediction,
+    Spectrum,
     Stiffness,
     Track,
     Weight,
@@ -57,6 +58,7 @@ from davinci_forces.report.sections import (
     joints,
     noise,
     parts,
+    prediction,
     runs,
     summary,
     tissue,
@@ -374,13 +376,61 @@ def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
 def test_remarks_that_differ_in_their_log_and_their_numbers_alone_take_one_place_on_page_one(
     lab: Lab, catalogue: Catalogue
 ):
-    texts = [f"log_{i}/hand_roll: harmonic 3 of the position is {i} % of the largest" for i in range(1, 6)]
-    remarks = [diagnostic("differentiate", text.partition(":")[0], "warning", text) for text in texts]
-    remarks.append(diagnostic("differentiate", "log_1", "warning", "log_1: another remark"))
+    texts = [f"log_{i}/hand_roll: harmonic {i} of the position is {i} % of the largest" for i in range(1, 6)]
+    remarks = [diagnostic("resample", text.partition(":")[0], "warning", text) for text in texts]
+    remarks.append(diagnostic("resample", "log_1", "warning", "log_1: another remark"))
     about = context(lab, Catalogue(lambda kind: [*catalogue.records(kind), *(remarks if kind is Diagnostic else [])]))
     first, second, *_ = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
-    assert first == "log_1/hand_roll: harmonic 3 of the position is 1 % of the largest (4 more remarks of this kind)"
+    assert first == "log_1/hand_roll: harmonic 1 of the position is 1 % of the largest (4 more remarks of this kind)"
     assert second == "log_1: another remark"
+
+
+@pytest.mark.parametrize(("share", "place"), [(0.4, 1), (0.012, 2)])
+def test_a_unit_fault_that_the_filter_finds_comes_before_harmonics_and_a_small_harmonic_after_other_warnings(
+    lab: Lab, catalogue: Catalogue, share: float, place: int
+):
+    cut = Spectrum("push", "hand_roll", 2, np.arange(4.0), np.array([0.0, 1.0, 0.5, share]))
+    remarks = {
+        "differentiate": "harmonic 3 of the position",
+        "choose": "another warning",
+        "ekf": "the filter's innovations are 1e+03 times as large as it assumes; check the units, signs and clock",
+    }
+    kinds = {Spectrum: [cut], Diagnostic: [diagnostic(stage, "push", "warning", x) for stage, x in remarks.items()]}
+    about = context(lab, Catalogue(lambda kind: kinds.get(kind, [])))
+    looks = summary.first_looks_in_order(about, [])
+    assert looks[0] == remarks["ekf"]
+    assert looks.index(remarks["differentiate"]) == place
+
+
+def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: Context):
+    [trust] = trusts(full, hand_roll=0.05)
+    assert trust.space is not None
+    narrow = replace(trust, space=replace(trust.space, coverage=0.3))
+    [(_, text)] = summary.looks_at_band(full, narrow)
+    assert "it covers only 30 % of free-space samples. More logs of free motion" in text
+    [wrong] = trusts(full, hand_roll=1.0)
+    [(_, text)] = summary.looks_at_band(full, replace(wrong, space=narrow.space))
+    assert "it covers only 30 % of free-space samples. See" in text
+
+
+def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):
+    [contact, *_] = full.catalogue.records(Contact)
+    contacts = [replace(contact, joint=joint) for joint in ("instrument_slide", "hand_pitch", "hand_roll")]
+    order = ["Hand roll", "Hand pitch", "Instrument slide"]
+    assert [panel.title for panel in contacts_section.peaks(full, contacts).panels] == order
+    levels = contacts_section.alarm_levels(full, contacts)
+    assert sorted(order, key=lambda joint: levels.index(joint.lower())) == order
+
+
+def test_scores_of_logs_whose_contacts_are_not_stated_are_said_to_hold_them(full: Context):
+    predictions = full.catalogue.records(Prediction)
+    assert "Contacts" not in prediction.every_score(full, predictions).caption
+    logs = tuple(replace(log, contact=(), free=()) if log.role == "contact" else log for log in full.study.logs)
+    unknown = replace(full, study=replace(full.study, logs=logs))
+    touched = dict.fromkeys(p.log for p in predictions if p.role == "contact")
+    assert touched
+    caption = prediction.every_score(unknown, predictions).caption
+    assert caption.endswith(f"Contacts that the study does not state are in those of {', '.join(touched)}.")
 
 
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):

@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -181,6 +182,31 @@ def test_the_numbers_of_a_figure_are_saved_as_csv(browser: Browser, file: Path) 
     half_a_code = np.ptp(np.sin(t)) / CODES / 2
     np.testing.assert_allclose(found[:, 1], np.sin(t), rtol=0, atol=1.01 * half_a_code)
     assert browser.run("document.querySelectorAll('figure .tools button[aria-label$=CSV]').length") == 4
+
+
+def test_a_figure_is_saved_as_a_drawing_that_any_program_reads(browser: Browser, file: Path) -> None:
+    browser.open(file)
+    root = ElementTree.fromstring(browser.run("drawing(document.getElementById('zoom'))"))
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    styles = [part.text or "" for part in root.iter("{http://www.w3.org/2000/svg}style")]
+    assert "stroke:#d55e00" in styles[0]
+    assert not any("var(" in text for text in styles)
+    assert browser.run("document.querySelectorAll('figure .tools button[aria-label$=paper]').length") == 4
+    browser.run("HTMLAnchorElement.prototype.click = function () { window.saved = this.download }")
+    browser.run("document.querySelector('#zoom .tools button[aria-label$=paper]').click()")
+    assert browser.run("saved").endswith(".svg")
+
+
+def test_a_table_that_goes_on_beyond_its_right_edge_fades_there_until_it_is_scrolled(
+    browser: Browser, file: Path
+) -> None:
+    browser.open(file, width=1280)
+    table, faded = "document.querySelector('#runs .scroll')", "matches('.cut')"
+    assert browser.run(f"{table}.scrollWidth > {table}.clientWidth && {table}.{faded}")
+    browser.run(f"{table}.scrollLeft = {table}.scrollWidth")
+    browser.settle()
+    assert not browser.run(f"{table}.{faded}")
+    assert not browser.run(f"document.querySelector('.table:not(#runs) .scroll').{faded}")
 
 
 def test_a_long_table_is_folded_searched_and_sorted(browser: Browser, file: Path) -> None:

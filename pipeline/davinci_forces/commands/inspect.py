@@ -49,6 +49,15 @@ class _Survey:
     outlines: dict[str, "Outline"]
     first: dict[str, list[float]]  # rows of each channel
     rows: int = 0
+    unusual: int = 0  # steps of the clock that go back or are gaps
+    unusual_seconds: float = 0.0  # their sum [s]
+
+    @property
+    def rate(self) -> float:
+        """Samples per second of the usual steps of the clock."""
+        clock = self.statistics
+        seconds = clock.last - clock.first - self.unusual_seconds
+        return (clock.samples - 1 - self.unusual) / seconds if seconds > 0 else clock.rate
 
 
 def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
@@ -76,11 +85,11 @@ def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
     source, main = first_clock or source, surveys.pop(first_clock)
     return {
         "file": str(file), "format": log.format, "rows": rows,
-        "started": log.started, "zone": log.zone, "clock": _clock(log, source, main.statistics),
-        "clocks": [_clock(log, clock, s.statistics) | {"channels": [*s.first]} for clock, s in surveys.items()],
+        "started": log.started, "zone": log.zone, "clock": _clock(log, source, main),
+        "clocks": [_clock(log, clock, s) | {"channels": [*s.first]} for clock, s in surveys.items()],
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
-        "warnings": [*warnings, *_flags(source, main.statistics)],
+        "warnings": [*warnings, *_flags(source, main)],
         "head": {name: [_plain(value) for value in first[name]] for name in names},
     }  # fmt: skip
 
@@ -89,7 +98,7 @@ def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
     """Read the channels of one clock; channel `source`, if any, holds its times."""
     import numpy as np
 
-    from davinci_forces.maths.signals.clock import ClockStatistics
+    from davinci_forces.maths.signals.clock import ClockStatistics, interruptions
     from davinci_forces.maths.signals.columns import Outline
     from davinci_forces.maths.units import measures, size
 
@@ -102,6 +111,8 @@ def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
         count = len(next(iter(block.values())))
         number = survey.rows + np.arange(count, dtype=float)  # counts samples where the log has no clock
         t = block.get(source, log.clock.start + number * log.clock.step if log.clock else number)
+        unusual, lasting = interruptions(np.append([survey.statistics.last] * bool(survey.rows), seconds * t))
+        survey.unusual, survey.unusual_seconds = survey.unusual + unusual, survey.unusual_seconds + lasting
         survey.statistics.update(seconds * t, [block[name] for name in measured])
         for name in names:
             survey.outlines[name].update(block[name])
@@ -110,7 +121,8 @@ def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
     return survey
 
 
-def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
+def _clock(log: "Log", source: str, survey: _Survey) -> dict[str, Any]:
+    clock = survey.statistics
     if not source and not log.clock:
         from davinci_forces.study.guessing import clock_hint
 
@@ -119,7 +131,7 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
         return {"source": f"{advice}, or {hint}" if hint else advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
-        "rate": _plain(clock.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
+        "rate": _plain(survey.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
         "duration": _plain(clock.last - clock.first), "backward": clock.backward, "repeated": clock.repeated,
         "duplicates": clock.duplicates,
     }  # fmt: skip
@@ -135,8 +147,9 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
     return labels | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
 
 
-def _flags(source: str, clock: "ClockStatistics") -> Iterator[str]:
+def _flags(source: str, survey: _Survey) -> Iterator[str]:
     """Warnings about a clock: repeated rows, times that do not increase, jitter and gaps."""
+    clock, rate = survey.statistics, survey.rate
     if clock.duplicates > MAX_REPEATED_OR_JITTER * clock.samples:
         share = clock.duplicates / clock.samples
         yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the previous row in every channel"
@@ -147,11 +160,11 @@ def _flags(source: str, clock: "ClockStatistics") -> Iterator[str]:
             f"time {source!r} goes back {clock.backward} times and repeats {clock.repeated} times, first in row "
             f"{clock.bad_row + 1}; name another time channel, or add rate = ... [Hz] for this log in study.toml"
         )
-    elif clock.jitter * clock.rate > MAX_REPEATED_OR_JITTER:
-        yield f"the clock has {clock.jitter * 1e3:.3g} ms of jitter (std) in intervals of {1e3 / clock.rate:.3g} ms"
-    if clock.longest_gap * clock.rate > 2.5:
+    elif clock.jitter * rate > MAX_REPEATED_OR_JITTER:
+        yield f"the clock has {clock.jitter * 1e3:.3g} ms of jitter (std) in intervals of {1e3 / rate:.3g} ms"
+    if clock.longest_gap * rate > 2.5:
         gap = clock.longest_gap
-        yield f"the longest gap between samples is {gap:.3g} s, {gap * clock.rate:.1f} sampling intervals"
+        yield f"the longest gap between samples is {gap:.3g} s, {gap * rate:.1f} sampling intervals"
 
 
 def _plain(value: float) -> float | None:

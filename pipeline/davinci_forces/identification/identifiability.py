@@ -15,6 +15,7 @@ MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than 
 MIN_PART_NAMED = 0.1  # a combination is reported with the parameters whose squared component is at least this
 MIN_Z = 2.0  # ratio of a parameter to its standard error; a smaller one is not significant
 MIN_R2 = 0.5  # a model that explains less of the effort's variance hardly describes the effort
+MAX_OMITTED = 0.1  # share of the largest harmonic; where a larger one is left out, that may be why a fit is bad
 
 
 def describe_correlated(names: Sequence[str], conditioning: least_squares.ColumnAnalysis) -> list[str]:
@@ -96,9 +97,13 @@ def are_negative(theta: Array, theta_std: Array) -> bool:
     return bool(len(theta) and 2 * np.count_nonzero(theta < -MIN_Z * theta_std) >= len(theta))
 
 
-def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
-    """Report that a model hardly describes the effort, with a possible cause; "" if it describes the effort."""
-    if r2 >= MIN_R2:
+def hardly_described(joint: Joint, r2: float, others: Sequence[str], omitted: float = 0.0) -> str:
+    """Report that a model hardly describes the effort, with a possible cause; "" if it describes the effort.
+
+    `omitted` is the largest harmonic left out of its motion, over the largest.  A motion without a commanded harmonic
+    is another one, so a bad fit to it says nothing of the channels; that harmonic is reported by `differentiate`.
+    """
+    if r2 >= MIN_R2 or omitted > MAX_OMITTED:
         return ""
     text = f"its own terms explain {percent(max(r2, 0.0))} of the effort's variance"
     if others:

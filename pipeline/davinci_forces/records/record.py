@@ -253,10 +253,14 @@ def by_name(records: Iterable[AnyRecord], scalar: str) -> dict[str, list[AnyReco
 
 
 def first_of_each_kind(remarks: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Yield the first of the remarks (stage, text) that begin alike after the log's name, and count the others."""
+    """Yield the first of the remarks (stage, text) that begin alike after the log's name, and count the others.
+
+    Numbers do not make a kind: "harmonic 3 of" and "harmonic 4 of" begin alike.
+    """
     kinds: dict[tuple[str, ...], list[str]] = {}
     for stage, text in remarks:
-        kinds.setdefault((stage, *(text.partition(": ")[2] or text).split()[:3]), []).append(text)
+        words = (text.partition(": ")[2] or text).split()[:3]
+        kinds.setdefault((stage, *(re.sub(r"\d+", "0", word) for word in words)), []).append(text)
     for (stage, *_), (first, *others) in kinds.items():
         more = f" ({len(others)} more remark{'s' * (len(others) > 1)} of this kind)" if others else ""
         yield stage, first + more

@@ -13,7 +13,10 @@ SUBJECTS = {  # what a key is about, by its first part; other keys are of the st
 }  # fmt: skip
 PAGE_ONE = ("model_error", "detection_level", "coverage")  # last parts of its keys
 OF_CANDIDATES = ("fit", "choice", "cv", "predict", "search", "guess", "identifiability", "correlation")
-RANKS = {"page one": 0, "model": 1, "contacts": 1, "forces": 2, "noise": 2, "study": 2, "candidates": 3}  # to sort by
+RANKS = {  # to sort by
+    "page one": 0, "model": 1, "contacts": 1, "forces": 2, "noise": 2, "study": 2,
+    "standard errors": 3, "candidates": 4,
+}  # fmt: skip
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
 
@@ -59,13 +62,18 @@ class Change:
 
     @property
     def subject(self) -> str:
-        """What the number is about, of RANKS; "candidates" are models and estimators that were not chosen."""
+        """What the number is about, of RANKS; "candidates" are models and estimators that were not chosen.
+
+        "standard errors" are those under keys of their own, which follow the values.
+        """
         start, *others = self.key.split(".")
         is_chosen = "chosen" in others
         if start in OF_CANDIDATES and not is_chosen:
             return "candidates"
         if others[-1:] and others[-1] in PAGE_ONE and (is_chosen or start == "effort"):
             return "page one"
+        if others and (others[-1].startswith("std_") or others[-1].endswith("_std")):
+            return "standard errors"
         start = start.partition("-")[0]  # ekf-euler is an ekf
         return next((subject for subject, starts in SUBJECTS.items() if start in starts), "study")
 
@@ -108,13 +116,21 @@ def windows_of(numbers: Mapping[str, StatedValue]) -> dict[str, Window]:
 
 
 def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:
-    """Changes by the joint that their keys name, "" for none, the weightiest first; `keys` are all keys of a study."""
+    """Changes by the joint that their keys name, "" for none, the weightiest first; `keys` are all keys of a study.
+
+    Those that repeat the numbers of another one, as of two estimators with one result, come last.
+    """
     joints = {key.split(".")[1]: None for key in keys if key.startswith(("fit.", "threshold."))}
     groups: dict[str, list[Change]] = {}
     for change in sorted(differing, key=lambda change: change.weight, reverse=True):
         joint = next((part for part in change.key.split(".")[1:] if part in joints), "")
         groups.setdefault(joint, []).append(change)
-    return {joint: groups[joint] for joint in (*joints, "") if joint in groups}
+    return {joint: _repetitions_last(groups[joint]) for joint in (*joints, "") if joint in groups}
+
+
+def _repetitions_last(group: Sequence[Change]) -> list[Change]:
+    first = {(c.key.rpartition(".")[2], c.before, c.after): c.key for c in reversed(group)}
+    return sorted(group, key=lambda c: first[c.key.rpartition(".")[2], c.before, c.after] != c.key)
 
 
 def has_changed(a: StatedValue, b: StatedValue) -> bool:

@@ -10,6 +10,7 @@ from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.records.prediction import CHOSEN, CHOSEN_BY_LOG
 from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.records.record import LogJointRecord
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Number, literal
 from davinci_forces.report.results import Results, format_unit
@@ -85,6 +86,11 @@ class Context:
         if fit.group in names:
             return [fit.group]
         return [name for name in names if any(str(p).endswith(f" of {name}") for p in fit.parameter)] or names
+
+    def joints_of(self, records: Iterable[LogJointRecord]) -> list[str]:
+        """The joints that records are of, in the robot's order, whatever logs come first."""
+        names = {record.joint for record in records}
+        return [joint.name for joint in self.study.robot.joints if joint.name in names]
 
     def true_stiffness(self, log: str) -> float | None:
         """The stiffness [N/m] of the tissue of a simulated log, None of a recorded one."""

@@ -157,7 +157,8 @@ def print_results(runner: Runner, folder: Path) -> None:
         runner.console.say(durations(runner.seconds))
     earlier = [line for line in runner.warnings if not line.startswith(f"{REPORT}: ")]  # those are right above
     if len(earlier) > 1:
-        runner.console.warn(f"the {len(earlier)} warnings of this run once more:")
+        kinds = "warnings and errors" if any(": error: " in line for line in earlier) else "warnings"
+        runner.console.warn(f"the {kinds} of this run once more, one of each kind:")
         remarks = ((": ".join(stage), text) for *stage, text in (line.split(": ", 2) for line in earlier))
         lines = [f"  {stage}: {text}" for stage, text in first_of_each_kind(remarks)]
         more = [f"  and {len(lines) - MAX_REPEATED} more, above"] if lines[MAX_REPEATED:] else []

@@ -15,7 +15,9 @@ from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study.names import (
     IN_DEGREES,
+    INSERTION_WORDS,
     PROCESSED_WORDS,
+    PSM_JOINTS,
     SIGNAL_WORDS,
     Numbered,
     is_time,
@@ -130,7 +132,7 @@ def clock_hint(log: Log) -> str:
 def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     """Assign channels whose names name a joint of the robot: `Roll motor angle`."""
     named = {channel.name: words_of(channel.alias or channel.name) for channel in channels if not is_time(channel)}
-    of_the_kit = any("insertion" in words for words in named.values()) and any("yaw" in w for w in named.values())
+    of_the_kit = all(any(label & {*words} for words in named.values()) for label in (INSERTION_WORDS, {"yaw"}))
     meanings: dict[str, Meaning] = {}
     for channel in channels:
         words = named.get(channel.name, [])
@@ -164,7 +166,8 @@ def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> 
 def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
     parts = words_of(joint.name)
     last = parts[-1] if not parts[-1].isdecimal() else ""
-    return joint.name in name.lower() or set(parts) <= set(words) or last in words
+    inserts = any(PSM_JOINTS[word] == joint.name for word in INSERTION_WORDS & {*words})
+    return joint.name in name.lower() or set(parts) <= set(words) or last in words or inserts
 
 
 def by_numbers(channels: Sequence[Channel]) -> Holding:

@@ -35,8 +35,9 @@ TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "
 TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-# Joints of the da Vinci Research Kit by its own labels.
-PSM_JOINTS = {"yaw": "hand_roll", "pitch": "hand_pitch", "insertion": "instrument_slide"}
+# Joints of the da Vinci Research Kit by its own labels, of which those of the slide are usual for any da Vinci arm.
+INSERTION_WORDS = {"insertion", "ins"}
+PSM_JOINTS = {"yaw": "hand_roll", "pitch": "hand_pitch", **dict.fromkeys(INSERTION_WORDS, "instrument_slide")}
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Read `raw/<study>/study.toml`, and report all its problems at once, each with its line."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import Field, fields, replace
 from pathlib import Path
@@ -56,11 +56,11 @@ def study_of(table: TomlTable, folder: Path) -> Study:
             except BadRobot as error:
                 table.problem(str(error), name)
             stated.close()
-    remarks = _remarks(table.table("settings"))
     settings = settings_of(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     baseline = _baseline(table, folder)
     logs = entries_of(table, robot)
+    remarks = (*_outdated(table.table("settings")), *_weightless(table, logs))
     table.close()
     lines = lines_of_files(table, logs)
     if table.file.problems():
@@ -157,9 +157,20 @@ def _with_base(robot: Robot | None, base: TomlTable) -> Robot | None:
     return robot.with_base((rpy[0], rpy[1], rpy[2])) if robot and rpy else robot
 
 
-def _remarks(settings: TomlTable) -> tuple[str, ...]:
-    """One warning, with its line, for each outdated setting that the file gives."""
-    return tuple(
+def _weightless(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
+    """Yield a warning, with its line, for each log of role weight that does not state where its mass hangs."""
+    for i, log in enumerate(logs):
+        if log.role == "weight" and log.weight is None:
+            yield (
+                f"{table.file.name}:{table.file.line(('log', i, 'role'))}: log {log.name!r} has the role weight, but "
+                "does not say where the mass hangs, so no mass is estimated; write weight = { mass = <kg, if known>, "
+                'moves_with = "<joint>", position = [x, y, z] }, in metres from the remote centre'
+            )
+
+
+def _outdated(settings: TomlTable) -> Iterator[str]:
+    """Yield a warning, with its line, for each outdated setting that the file gives."""
+    yield from (
         f"{settings.file.name}:{settings.file.line((*settings.path, name))}: the setting {name!r} no longer has an "
         "effect; remove it"
         for name in OUTDATED_SETTINGS

@@ -66,9 +66,11 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
 def _word(path: str) -> tuple[str, str]:
     """The kind of the first word that tells a role, and the word: of the file first, then of its folders upwards."""
     for part in reversed(path.split("/")):
-        text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:\.\d+)?", part)).lower()
+        text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:[.p]\d+)?", part)).lower()
         kinds = [(kind, match[0]) for kind, words in WORDS.items() if (match := re.search(rf"\b({words})\b", text))]
         if kinds:
+            if kinds[0][0] == "weight" and (mass := MASS.search(text)):
+                return "weight", mass[0]  # `weight150g`: the mass says more than the word
             clash = {kind for kind, _ in kinds} & {"identification", "contact", "tissue", "weight"}
             if kinds[0][0] != "free" and "identification" in clash and len(clash) > 1:
                 return "clash", " and ".join(word for _, word in kinds)

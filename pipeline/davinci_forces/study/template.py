@@ -282,9 +282,7 @@ class _Writer:
         joints, holding = self.robot.joints, self.draft.guess
         lacking = {m.joint for m in holding.meanings.values()} - {*holding.joints_of_ranges()}
         yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
-        if holding.robot and len({m.joint for m in holding.meanings.values()}) < len(joints):
-            names = [c.name for c in self.draft.log.channels if c.kind == "number" and c.name not in holding.meanings]
-            yield from (f"joint of {name}" for name in names if symbol_of(words_of(name)) == "q")
+        yield from (f"joint of {name}" for name, symbol in self._without_joint().items() if symbol == "q")
         if self.role.role == "weight":
             yield "weight = ... is missing: without it no mass is estimated"
 
@@ -316,6 +314,14 @@ class _Writer:
             return f'contact = "all"  # {reason}'
         return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'
 
+    def _without_joint(self) -> dict[str, str]:
+        """Symbols by name of channels named as those of a joint, but of none of the robot's, while it lacks some."""
+        holding = self.draft.guess
+        if not holding.robot or len({m.joint for m in holding.meanings.values()}) == len(self.robot.joints):
+            return {}
+        names = [c.name for c in self.draft.log.channels if c.kind == "number" and c.name not in holding.meanings]
+        return {name: symbol for name in names if (symbol := symbol_of(words_of(name)))}
+
     def _unknown_units(self) -> set[str]:
         """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
         wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
@@ -330,7 +336,7 @@ class _Writer:
     def _channels(self) -> Iterator[str]:
         """A line for each channel: what it is, with its unit and the reason, or a comment."""
         log, holding, touching = self.draft.log, self.draft.guess, self.draft.touching
-        timing, unknown = holding.timing, self._unknown_units()
+        timing, unknown, without_joint = holding.timing, self._unknown_units(), self._without_joint()
         if timing.time.isdecimal():
             yield f"time = {timing.time}  # {timing.reason}"
         big = _in_millimetres(log, touching)
@@ -353,8 +359,10 @@ class _Writer:
             elif is_time(channel) and log.clock is not None:
                 yield f"# time = {_text(channel.name)}  # the log has its own clock"
             else:
-                unit = f"  # in {channel.unit}" if channel.unit else ""
-                yield f'# "<joint>.<quantity>" = {_text(channel.name)}{unit}'
+                symbol = without_joint.get(channel.name, "")
+                notes = ["MISSING: the joint"] * bool(symbol) + [f"in {channel.unit}"] * bool(channel.unit)
+                comment = f"  # {'; '.join(notes)}" if notes else ""
+                yield f'# "<joint>.{symbol or "<quantity>"}" = {_text(channel.name)}{comment}'
 
     def _meaning_line(self, channel: Channel, meaning: Meaning, unit_unknown: bool) -> str:
         """The line of a joint's channel; commented out where the joint does not move or is unknown."""

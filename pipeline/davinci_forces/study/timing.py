@@ -10,6 +10,7 @@ import numpy as np
 from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals import columns
+from davinci_forces.maths.signals.clock import interruptions
 from davinci_forces.maths.units import measures, since_1970, size
 from davinci_forces.study.names import is_time
 
@@ -119,7 +120,10 @@ def _rises(t: Array) -> bool:
 
 
 def _step(t: Array) -> float:
-    return float(t[-1] - t[0]) / (len(t) - 1)
+    """Mean sampling time, without the steps that go back and the gaps."""
+    count, seconds = interruptions(t)
+    usual = len(t) - 1 - count
+    return (float(t[-1] - t[0]) - seconds) / usual if usual else float(t[-1] - t[0]) / (len(t) - 1)
 
 
 def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> TimeGuess | None:

@@ -162,6 +162,18 @@ def amplitudes(x: Array) -> Array:
     return spectrum
 
 
+def largest_omitted(amplitude: Array, harmonics: int) -> tuple[int, float]:
+    """The order of the largest of `amplitude` (mean, harmonics 1, 2, ...) that is not kept, over the largest of all.
+
+    (0, 0.0) if all are kept, or all are 0.
+    """
+    omitted, largest = amplitude[harmonics + 1 :], float(amplitude[1:].max(initial=0.0))
+    if not len(omitted) or not largest:
+        return 0, 0.0
+    order = harmonics + 1 + int(omitted.argmax())
+    return order, float(amplitude[order]) / largest
+
+
 def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:
     """Covariance (3, 3) of x, dx and ddx from white noise in K samples of a period, after the projection on harmonics.
 

@@ -87,6 +87,17 @@ class ClockStatistics:
         return std if std > 1e-9 * abs(self._mean) else 0.0
 
 
+def interruptions(t: Array) -> tuple[int, float]:
+    """Count the steps of times (N,) that go back or are gaps, and add them up [s]: what is not the sampling time.
+
+    A gap is longer than `GAP` times the median step.
+    """
+    steps = np.diff(t)
+    forward = steps[steps > 0]
+    unusual = steps[(steps < 0) | (steps > GAP * np.median(forward))] if len(forward) else steps
+    return len(unusual), float(unusual.sum())
+
+
 def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tuple[Array, Booleans, Booleans]:
     """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,).
 

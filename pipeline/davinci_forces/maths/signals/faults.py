@@ -143,7 +143,7 @@ def is_continuous(x: Array, lost: float) -> bool:
     degrees = len(s) - broken.shape[1]
     fits = [(basis, np.linalg.lstsq(basis, x.T, rcond=None)[0]) for basis in (whole, broken)]
     smooth, jumping = (((x.T - basis @ c) ** 2).sum(axis=0) for basis, c in fits)  # residual squares (J,)
-    noise = np.maximum(jumping / degrees, 1e-24 * np.maximum(x.var(axis=1), 1e-300))
+    noise = np.maximum(jumping / degrees, np.maximum(1e-24 * x.var(axis=1), 1e-300))  # also of a joint at rest at 0
     if np.any((smooth - jumping) / 2 / noise > fdtri(2, degrees, 1.0 - BREAK_PROBABILITY)):
         return False
     _, c = fits[1]

@@ -23,7 +23,8 @@ def section(context: Context) -> Iterator[Block]:
 def blocks(context: Context, before: Mapping[str, StatedValue], differences: Sequence[Change]) -> Iterator[Block]:
     """The section's content."""
     changed = [c for c in differences if c.before and c.after]
-    changed.sort(key=lambda c: -abs(c.z) if c.z is not None else -math.inf)  # those without standard error first
+    # Those without standard error come first, and standard errors last.
+    changed.sort(key=lambda c: (c.subject == "standard errors", -abs(c.z) if c.z is not None else -math.inf))
     came, went = [c.key for c in differences if not c.before], [c.key for c in differences if not c.after]
     shared = sum(key in context.results for key in before)
     yield Prose(

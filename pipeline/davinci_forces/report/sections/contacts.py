@@ -36,7 +36,7 @@ def section(context: Context) -> Iterator[Block]:
             "flattens the peak. Peaks are judged by the lower detection level: 99 % of the samples of the joint's "
             f"worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
-        yield peaks(contacts)
+        yield peaks(context, contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "Interval: 95 % confidence interval of the peak, not below that of the mean. Verdict: whether the peak "
@@ -61,7 +61,7 @@ def section(context: Context) -> Iterator[Block]:
 
 def alarm_levels(context: Context, contacts: list[Contact]) -> str:
     """The alarm level of each joint, in words."""
-    joints = dict.fromkeys(contact.joint for contact in contacts)
+    joints = context.joints_of(contacts)
     return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
 
 
@@ -98,9 +98,9 @@ def verdict(contact: Contact, i: int) -> str:
     return ("detected" if contact.found[i] else "peak only") if contact.above[i] else "not detected"
 
 
-def peaks(contacts: list[Contact]) -> Figure:
+def peaks(context: Context, contacts: list[Contact]) -> Figure:
     """The peak of every window, with the detection level of its joint."""
-    joints = list(dict.fromkeys(contact.joint for contact in contacts))
+    joints = context.joints_of(contacts)
     missed = sum(int((contact.above == 0).sum()) for contact in contacts)
     total = sum(len(contact) for contact in contacts)
     caption = (

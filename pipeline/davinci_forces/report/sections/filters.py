@@ -48,7 +48,7 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
         yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
-        compared = comparison(context, comparisons), overlay(comparisons), noise_over_delay(noises)
+        compared = comparison(context, comparisons), overlay(context, comparisons), noise_over_delay(noises)
         yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
     if logs := context.catalogue.records(Streamed):
         yield OnScreen("The same filter as samples arrive", "filters-streamed", (stream_table(context, logs),))
@@ -144,9 +144,9 @@ def name_of(label: str) -> str:
     return filters.title(name) if name in filters.FILTERS else f"{filters.title(filters.DEFAULT)}, joint alone"
 
 
-def overlay(compared: list[Comparison]) -> Figure:
+def overlay(context: Context, compared: list[Comparison]) -> Figure:
     """The efforts of four filters in the middle of a run, joint by joint."""
-    joints = list(dict.fromkeys(c.joint for c in compared))
+    joints = context.joints_of(compared)
     panels = tuple(panel([c for c in compared if c.joint == joint], i == 0) for i, joint in enumerate(joints))
     return Figure(
         "External effort in free motion by four filters. The true one is 0; the deviation is mainly the model's error, "

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections import parts
@@ -47,7 +47,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     scores = (*estimators(context, predictions), every_score(context, predictions))
     yield OnScreen("Every fit compared, and its scores in every run", "all-scores", scores)
     unseen = parts.of_free_motion(context, used)
-    joints = dict.fromkeys(p.joint for p in unseen)
+    joints = context.joints_of(unseen)
     worst = [max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error) for joint in joints]
     worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))  # the worst of all on paper
     figures = [figure(context, p) for p in worst]
@@ -73,13 +73,16 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
     caption = "Scores of the raw effort, and the relative error of the low-passed effort."
+    logs = dict.fromkeys(p.log for p in predictions)
+    if touched := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
+        caption += f" Contacts that the study does not state are in those of {', '.join(touched)}."
     return Table(caption, header, rows, "scores-table", "lllrrrrrr")
 
 
 def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:
     """The worst model error of every fit, joint by joint."""
     fits = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
-    joints = list(dict.fromkeys(p.joint for p in predictions))
+    joints = context.joints_of(predictions)
     if len(fits) < 2:
         return
     errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}

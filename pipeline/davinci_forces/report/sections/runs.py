@@ -28,8 +28,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
     yield from intro(context, tracks)
     yield from parts.paper_or_screen(scores(context, tracks))
-    joints = dict.fromkeys(track.joint for track in tracks)
-    spaces = [space for joint in joints if (space := context.worst_space(joint)) is not None]
+    spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
     traces = [trace(context, t, WORST) for t in worst]
     yield from parts.first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)

@@ -27,6 +27,7 @@ from davinci_forces.identification.unseen import left_out
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
+from davinci_forces.maths.periods.harmonics import largest_omitted
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
@@ -42,7 +43,7 @@ from davinci_forces.records.model import (
 )
 from davinci_forces.records.prediction import Prediction
 from davinci_forces.records.record import Column, Diagnostic, diagnostic
-from davinci_forces.records.recordings import Motion, Trajectory
+from davinci_forces.records.recordings import Motion, Spectrum, Trajectory
 from davinci_forces.robots.models import Reach, independent, round_scale
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -69,6 +70,7 @@ def run(
     trajectories: Iterable[Trajectory],
     motions: Annotated[Iterable[Motion], "identification"],
     robot: Robot,
+    spectra: Iterable[Spectrum] = (),
     *,
     lowpass: float,
 ) -> Iterator[
@@ -79,6 +81,7 @@ def run(
     A joint with several logs also gets a CrossFit, which predicts each log from fits to the other logs.
     """
     averaged, moving, unaveraged = list(trajectories), list[tuple[str, str]](), list[Motion]()
+    all_spectra = list(spectra)
     repeating = {(t.log, t.joint) for t in averaged}
     for motion in motions:
         if not motion.at_rest:
@@ -90,7 +93,8 @@ def run(
         parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
-            yield from fit_joint(model, parts, robot, others, lowpass)
+            shares = [largest_omitted(s.amplitude, s.harmonics)[1] for s in all_spectra if s.joint == joint.name]
+            yield from fit_joint(model, parts, robot, others, max(shares, default=0.0), lowpass)
 
 
 def apply(
@@ -113,11 +117,14 @@ def apply(
 
 
 def fit_joint(
-    model: IndependentJoint, parts: Sequence[Part], robot: Robot, others: Sequence[str], lowpass: float
+    model: IndependentJoint, parts: Sequence[Part], robot: Robot, others: Sequence[str], omitted: float, lowpass: float
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
-    """Fit one joint by every estimator, with residuals, identifiability and noise; `others` move in its logs, too."""
+    """Fit one joint by every estimator, with residuals, identifiability and noise; `others` move in its logs, too.
+
+    `omitted` is the largest harmonic that its motion lacks, over the largest of all.
+    """
     regression = join_regressions([part.regression for part in parts])
     regression = replace(regression, model_std=model_errors(model, parts, robot, regression))
     estimates: dict[str, Estimate] = {}
@@ -131,7 +138,7 @@ def fit_joint(
         yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search, regression) for search in estimate.run_searches())
-    yield from identifiability(model, regression, estimates, robot, others)
+    yield from identifiability(model, regression, estimates, robot, others, omitted)
     yield from cost_of_consistency(model.group, regression, estimates, robot.joint(model.group).unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
@@ -158,7 +165,12 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
 
 
 def identifiability(
-    model: IndependentJoint, regression: Regression, estimates: dict[str, Estimate], robot: Robot, others: Sequence[str]
+    model: IndependentJoint,
+    regression: Regression,
+    estimates: dict[str, Estimate],
+    robot: Robot,
+    others: Sequence[str],
+    omitted: float,
 ) -> Iterator[Identifiability | Diagnostic]:
     """Assess how well the logs determine the parameters, and explain an inertia that is not positive."""
     plain = estimates.get("lse")
@@ -185,7 +197,7 @@ def identifiability(
         why = why_not_positive(robot, joint, estimate, excitation, others)
         message = f"{model.group}: {join_names(wrong)} {verb} an inertia that is not positive: {why}"
         yield diagnostic("fit", model.group, "note", message)  # `predict` warns if this model is used
-    if message := hardly_described(joint, r_squared(regression, plain), others):
+    if message := hardly_described(joint, r_squared(regression, plain), others, omitted):
         severity = "note" if others else "warning"  # with others, a model of the whole arm may be used
         yield diagnostic("fit", model.group, severity, f"{model.group}: {message}")
 

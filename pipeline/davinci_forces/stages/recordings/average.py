@@ -44,8 +44,9 @@ def run(
         )
     if not moving:
         raise NotPeriodic(
-            f"{entry.name}: no joint moves, so there is nothing to identify; check its channels, their units, and the "
-            f"clock, of {signals[0].rate:.4g} Hz"
+            f"{entry.name}: no joint moves of those that study.toml names, {', '.join(at_rest)}, so there is nothing "
+            "to identify; name the channels of the joint that moves, or check their units, and the clock, of "
+            f"{signals[0].rate:.4g} Hz"
         )
     max_harmonics = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)

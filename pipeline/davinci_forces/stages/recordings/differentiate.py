@@ -18,13 +18,12 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
     yield Trajectory.like(average, harmonics=orders, q=q, dq=dq, ddq=ddq)
     amplitude = fourier.amplitudes(average.q)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
-    omitted = amplitude[orders + 1 :]
-    if len(omitted) and omitted.max() > MAX_OMITTED_HARMONIC * amplitude[1:].max():
-        largest = orders + 1 + int(omitted.argmax())
+    largest, share = fourier.largest_omitted(amplitude, orders)
+    if share > MAX_OMITTED_HARMONIC:
         yield diagnostic(
             "differentiate", f"{average.log}.{average.joint}", "warning",
             f"{average.log}/{average.joint}: harmonic {largest} of the position is "
-            f"{omitted.max() / amplitude[1:].max():.1%} of the largest, but only {orders} harmonics are kept; raise "
+            f"{share:.1%} of the largest, but only {orders} harmonics are kept; raise "
             "`harmonics` in [settings] if it was commanded",
         )  # fmt: skip
 

@@ -1,11 +1,12 @@
 """The answer: the external effort, how far to trust it, and what to look at first."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Track, first_of_each_kind
+from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Spectrum, Track, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
@@ -15,9 +16,10 @@ from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
 from davinci_forces.robots.robot import Kind
 
-SPOILS_ALL = ("resample", "differentiate")  # stages whose warnings are of motion or units, on which all else rests
-NOT_ESTIMATED = "its external effort is not estimated"  # in a warning that leaves a joint without an answer
-FIRST_OF_ALL = 100.0  # weight of such warnings
+SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
+# In a warning of any stage that blames units, or leaves a joint without an answer.
+COMES_FIRST = re.compile(r"check the units|its external effort is not estimated")
+FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 MAX_IN_COLUMN = 3  # panels below each other on page one
@@ -231,6 +233,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
+    omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     warnings = (
         (diagnostic.stage, text)
         for diagnostic in context.catalogue.records(Diagnostic)
@@ -238,7 +241,15 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         if severity == "warning"
     )
     for stage, text in first_of_each_kind(warnings):
-        yield FIRST_OF_ALL if stage in SPOILS_ALL or NOT_ESTIMATED in text else 1.5, literal(text.replace("`", ""))
+        by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
+        weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size
+        yield weight, literal(text.replace("`", ""))
+
+
+def omitted_share(spectrum: Spectrum) -> float:
+    """The largest harmonic that is not kept, over the largest of all; 0 if all are kept."""
+    omitted = spectrum.amplitude[spectrum.harmonics + 1 :].max(initial=0.0)
+    return float(omitted / (spectrum.amplitude[1:].max(initial=0.0) or 1.0))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
@@ -279,8 +290,9 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
-        narrow = f"{covers} More logs of free motion, at these speeds and on other days, calibrate it."
-        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{see_runs}"
+        if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
+            covers += " More logs of free motion, at these speeds and on other days, calibrate it."
+        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:

@@ -77,8 +77,19 @@ function toolsOf(figure) {
   return tools;
 }
 
+// The picture of a figure as a file: with the colours of paper in place of names, which drawing programs do not know.
+function drawing(figure) {
+  const { src } = figure.querySelector(".drawing img");
+  const picture = decodeURIComponent(src.slice(src.indexOf(",") + 1));
+  const colours = new Map([...(/:root\{(.*?)\}/.exec(picture)?.[1] ?? "").matchAll(/(--\w+):([^;]+)/g)].map(([, name, colour]) => [name, colour]));
+  return picture.replace(/var\((--\w+)\)/g, (_, name) => colours.get(name));
+}
+
 for (const figure of document.querySelectorAll("figure:has(> script.numbers)")) {
   const name = figure.querySelector("figcaption a").textContent.replace(/\W+$/, "");
-  const file = `${document.title.split(" – ")[0]}-${name}.csv`.toLowerCase().replace(/[^a-z0-9.]+/g, "-");
-  toolsOf(figure).append(newButton("CSV", `Numbers of ${name} as CSV`, () => save(csv(numbersOf(figure)), file)));
+  const file = `${document.title.split(" – ")[0]}-${name}`.toLowerCase().replace(/[^a-z0-9.]+/g, "-");
+  toolsOf(figure).append(
+    newButton("SVG", `${name} as a drawing for a paper`, () => save(drawing(figure), `${file}.svg`, "image/svg+xml", "")),
+    newButton("CSV", `Numbers of ${name} as CSV`, () => save(csv(numbersOf(figure)), `${file}.csv`)),
+  );
 }

@@ -20,6 +20,7 @@ function prepareTable(region) {
   if (rows.length >= SORTED_FROM) for (const head of region.querySelectorAll("thead th")) makeSortable(head, body, rows, update);
   const scroll = region.querySelector(".scroll");
   const name = scroll.getAttribute("aria-label");
+  fadeWhereCut(scroll);
   if (rows.length >= SEARCHED_FROM) scroll.before(newSearch(name, rows.length, state, update));
   if (!state.folded) return;
   const fold = newButton("", "", () => {
@@ -38,6 +39,13 @@ function prepareTable(region) {
     said();
   });
   said();
+}
+
+// Fade the right edge of a table that goes on beyond it, so that a reader knows to scroll.
+function fadeWhereCut(scroll) {
+  const update = () => scroll.classList.toggle("cut", scroll.scrollWidth - scroll.clientWidth - scroll.scrollLeft > 4); // px
+  scroll.addEventListener("scroll", update, { passive: true });
+  new ResizeObserver(update).observe(scroll);
 }
 
 function newSearch(name, count, state, update) {
