@@ -2,10 +2,12 @@
 
 import gc
 import os
+import pickle
 import signal
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -31,6 +33,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 BESIDE = ROOT.parent / "shared" / "data"
 BENCHMARKS = HERE / "benchmarks"
+DRAWN: dict[bytes, dict[str, bytes]] = {}  # the pages of documents, by a hash of what they show
 # An arm whose friction the models describe (`matched`), and the same arm with another friction (`realistic`).
 TWO_FRICTIONS = str(HERE / "simulation" / "two-frictions.toml")
 # A coarser design of a robot: one start of each search of an excitation, and larger tolerances of simulated control.
@@ -93,6 +96,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_verify_passes_over_files_that_are_no_entries",
     ),
     "test_runs.py": (),
+    "test_verified_runs.py": (),
 }
 
 # Tests that `make test` leaves to `--slow`, which continuous integration runs: for every test of a file, or with a
@@ -265,7 +269,6 @@ SLOW: dict[str, dict[str, int]] = {
         "test_a_stage_runs_again_and_says_why": 0,
         "test_the_report_is_written_again_when_what_it_shows_or_it_itself_changed": 0,
         "test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes": 0,
-        "test_verify_names_a_file_in_which_one_byte_was_altered": 3,
     },
     "test_shown.py": {
         "test_a_name_that_is_no_unicode_costs_a_message": 0,
@@ -287,6 +290,9 @@ SLOW: dict[str, dict[str, int]] = {
         "test_on_another_processor_numbers_are_compared": 0,
         "test_verify_names_what_was_done": 2,
         "test_what_was_forged_with_all_its_hashes_does_not_come_from_raw": 0,
+    },
+    "test_verified_runs.py": {
+        "test_verify_names_a_file_in_which_one_byte_was_altered": 3,
     },
     "test_weighing.py": {
         "test_free_motion_at_another_speed_is_part_of_the_error_of_each_joint": 0,
@@ -313,7 +319,7 @@ FIRST = (
     "test_runs.py", "test_cluster.py", "test_long_logs.py", "test_real_data.py", "simulation/test_excitation_limits.py",
     "contracts/test_approved.py", "test_tampering.py", "test_weighing.py", "contracts/test_sections.py",
     "test_wheel.py", "logs/test_damage.py", "guide/test_notebook.py", "logs/test_bag_study.py", "tissue/test_arm.py",
-    "test_compiled.py", "test_robustness.py", "logs/test_ros_cut.py", "robot/test_kernels.py",
+    "test_compiled.py", "test_robustness.py", "test_verified_runs.py", "logs/test_ros_cut.py", "robot/test_kernels.py",
     "simulation/test_thesis_study.py", "tissue/test_palpation.py", "simulation/test_excitation.py", "test_ekf.py",
     "tissue/test_tissue_logs.py", "simulation/test_closed_loop.py", "test_period.py", "contracts/test_estimators.py",
     "report/test_campaign.py", "test_consistent.py", "test_parameter_errors.py", "test_shipped_studies.py",
@@ -416,23 +422,26 @@ def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def typeset_once() -> Iterator[None]:
-    """Each page is typeset once a file of tests: where a report is made anew, it is nearly always the one that was.
+def drawn_once() -> Iterator[None]:
+    """Each document is drawn once a process: where a report is made anew, it is nearly always what it was.
 
     Not where the same data have to give the same pages, in test_runs.py: a page that is remembered is the same anyhow.
     """
-    import typst
+    from davinci_forces.report import report
 
-    compile_page, known = typst.compile_with_warnings, {}
+    draw = report.render_all
 
-    def remembered(template, **options):
-        key = template, repr(sorted(options.items()))
-        if key not in known:
-            known[key] = compile_page(template, **options)
-        return known[key]
+    def remembered(documents):
+        pages = {}
+        for document in documents:
+            key = sha256(pickle.dumps(document)).digest()
+            if key not in DRAWN:
+                DRAWN[key] = draw((document,))
+            pages |= DRAWN[key]
+        return pages
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(typst, "compile_with_warnings", remembered)
+        patch.setattr(report, "render_all", remembered)
         yield
 
 

@@ -20,7 +20,7 @@ from tests.test_robustness import analysed, finished, flat, raw, small  # noqa: 
 from tests.test_runs import call, contents, edit, processed, reports
 from tests.test_workers import end_within
 
-pytestmark = pytest.mark.usefixtures("typeset_once")
+pytestmark = pytest.mark.usefixtures("drawn_once")
 LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)

@@ -17,7 +17,7 @@ from davinci_forces.runner.plan import Task
 from tests.test_robustness import analysed, finished, flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, processed, reports
 
-pytestmark = pytest.mark.usefixtures("typeset_once")
+pytestmark = pytest.mark.usefixtures("drawn_once")
 EARLIER = Path(__file__).parent / "earlier"
 PAGES = ("report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt", "summary.json")
 

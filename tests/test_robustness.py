@@ -33,7 +33,7 @@ from tests import arm
 from tests.conftest import once
 from tests.test_runs import call, processed, reports
 
-pytestmark = pytest.mark.usefixtures("typeset_once")
+pytestmark = pytest.mark.usefixtures("drawn_once")
 
 
 @pytest.fixture

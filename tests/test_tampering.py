@@ -22,7 +22,7 @@ from davinci_forces.runner.ledger import Folders, Ledger
 from tests.test_robustness import analysed, finished, flat  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, processed, reports
 
-pytestmark = pytest.mark.usefixtures("typeset_once")
+pytestmark = pytest.mark.usefixtures("drawn_once")
 
 
 def ledger_of(study: Path) -> Ledger:

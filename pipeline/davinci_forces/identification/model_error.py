@@ -160,4 +160,5 @@ def with_offset(part: CandidatePart) -> Iterator[CandidatePart]:
 
 def identities(part: CandidatePart) -> list[tuple[str, float]]:
     """Return the name and the scale of each parameter of a part."""
-    return [identity(part.library.model.parameters[i]) for i in part.columns]
+    parameters = part.library.model.parameters
+    return [identity(parameters[i]) for i in part.columns]

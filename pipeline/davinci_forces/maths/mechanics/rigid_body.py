@@ -7,6 +7,7 @@ more than n coordinates, the others are at rest at 0.
 """
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,7 +102,7 @@ def regressor(
     q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
     n, L = q.shape[-1], len(chain.parent) if L is None else L
     rows, N = list(range(n) if rows is None else rows), q.size // n
-    tree = tree_of(chain.with_coordinates(n), np.zeros((len(chain.parent), 10)))
+    tree = massless_tree(chain, n)
     moves = tree.moves & np.isin(np.arange(n), rows)
     work, Y = np.zeros(((n + 1) * (L + 1), 9, N)), np.zeros((n, L, 10, N))
     first_links = tree._replace(parent=tree.parent[:L], moves=moves).lists()
@@ -115,9 +116,14 @@ def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
 
     n, L = q.shape[-1], len(chain.parent)
     Y = np.empty((*q.shape, 10 * L))
-    tree = tree_of(chain.with_coordinates(n), np.zeros((L, 10)))
-    regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, L, 10))
+    regressors(massless_tree(chain, n), GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, L, 10))
     return Y
+
+
+@cache  # a search asks for thousands of regressors of one chain
+def massless_tree(chain: Chain, n: int) -> Tree:
+    """The tree of all links with the first n coordinates of the arm; a regressor does not depend on their masses."""
+    return tree_of(chain.with_coordinates(n), np.zeros((len(chain.parent), 10)))
 
 
 def loaded_by_gravity(chain: Chain) -> list[bool]:

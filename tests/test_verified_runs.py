@@ -1,0 +1,51 @@
+"""What `verify` says of a run to which something was done since: each altered byte is named by its file."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.test_runs import call, finished, processed, reports  # noqa: F401 - fixtures
+
+pytestmark = pytest.mark.usefixtures("drawn_once")
+
+
+def flip(file: Path, at: int) -> None:
+    content = bytearray(file.read_bytes())
+    content[at % len(content)] ^= 1
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("where", ["raw", "processed", "reports"])
+def test_verify_names_a_file_in_which_one_byte_was_altered(finished, where, seed):  # noqa: F811
+    rng = np.random.default_rng(seed)
+    files = sorted(f for f in (finished.parent.parent / where).rglob("*") if f.is_file() and f.stat().st_size)
+    target = files[rng.integers(len(files))]
+    flip(target, int(rng.integers(target.stat().st_size)))
+    said = " ".join(call("verify", finished, code=1).split())
+    assert target.name in said
+
+
+def test_verify_names_a_number_that_was_altered(finished):  # noqa: F811
+    file = reports(finished) / "results.json"
+    results = json.loads(file.read_text())
+    for result in results:
+        if result["key"] == "fit.hand_roll.independent.lse.inertia":
+            result["value"] += 1e-9
+    file.write_text(json.dumps(results))
+    said = " ".join(call("verify", finished, code=1).split())
+    assert "fit.hand_roll.independent.lse.inertia: has" in said
+
+
+def test_verify_notices_files_that_are_gone_or_of_unknown_origin(finished):  # noqa: F811
+    (processed(finished) / "fit" / "hand_roll" / "independent.lse.parquet").unlink()
+    shutil.copy(
+        processed(finished) / "track" / "roll" / "hand_roll.parquet",
+        processed(finished) / "track" / "roll" / "stray.parquet",
+    )
+    said = " ".join(call("verify", finished, code=1).split())
+    assert "independent.lse.parquet is missing" in said
+    assert "stray.parquet was made by no stage" in said
