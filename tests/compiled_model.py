@@ -19,7 +19,7 @@ from davinci_forces.records import FilterNoise, JointModel, Motion
 FLAGS = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 AS_C, AS_CPP = ("-std=c99",), ("-std=c++11", "-x", "c++")
 COMPILERS = {"gcc": AS_C, "clang": AS_C, "g++": AS_CPP, "clang++": AS_CPP}
-OK, OUTSIDE, BAD = range(3)
+OK, OUTSIDE, BAD, OTHER_RATE = range(4)
 
 
 class CompiledModel:
@@ -51,7 +51,7 @@ class CompiledModel:
         z = int(files["model.h"].partition("DF_STATES = ")[2].partition(" ")[0])
         self.library, number = ctypes.CDLL(str(folder / "model.so")), ctypes.c_float if floats else ctypes.c_double
         self.number = number
-        self.State = structure(runs=ctypes.c_int, t=ctypes.c_double, z=number * z, x=number * 9)
+        self.State = structure(runs=ctypes.c_int, t=ctypes.c_double, pace=ctypes.c_double, z=number * z, x=number * 9)
         of_joint = {"t": ctypes.c_double} | dict.fromkeys(("tau", "q_measured", "dq_measured"), number)
         self.Sample = structure(**of_joint, **dict.fromkeys(("q", "dq", "ddq"), number * n))
         self.Result = structure(

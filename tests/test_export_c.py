@@ -12,7 +12,7 @@ from davinci_forces.filters.problem import FilterInput
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.dvrk_psm import ROBOT as PSM
-from tests.compiled_model import BAD, OK, OUTSIDE, CompiledModel
+from tests.compiled_model import BAD, OK, OTHER_RATE, OUTSIDE, CompiledModel
 from tests.exported import NOISE, RATE, export, motion, motion_of
 
 ROBOTS = {"davinci": DAVINCI, "psm": PSM, "tilted": DAVINCI.with_base((0.3, -0.7, 0.2))}
@@ -166,3 +166,45 @@ def test_bad_input_changes_nothing_and_a_gap_restarts(model):
     assert compiled.step(0, 0.10, *good) == OK
     assert compiled.result.std_filter == pytest.approx(0.7) != uncertain
     assert np.isnan(compiled.call("gravity", 0, [np.nan, 0, 0])[1])
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    given = export(DAVINCI, "independent")
+    return CompiledModel(renderer("c")(given).files, tmp_path_factory.mktemp("plain"))
+
+
+def steps(compiled, times):
+    zero = [0.0] * 3
+    return [compiled.step(0, t, 0.1, 0.2, 0.0, [0.2, 0.0, 0.0], zero, zero) for t in times]
+
+
+@pytest.mark.parametrize("faster", [10.0, 2.0, 1.04, 0.96, 0.6, 0.5, 0.1])
+def test_samples_at_another_rate_give_no_number_until_the_rate_is_that_of_the_filter(plain, faster):
+    plain.restart()
+    times = np.arange(300) / (faster * RATE)
+    statuses = steps(plain, times)
+    assert statuses[0] == OK
+    assert set(statuses[200:]) == {OTHER_RATE}
+    r = plain.result
+    assert np.isnan([r.tau_hat, r.tau_ext, r.std_filter, r.std]).all()
+    assert r.contact == -1
+    for t in times[-1] + np.arange(1, 900) / RATE:
+        if steps(plain, [t]) == [OK]:
+            break
+    assert np.isfinite([r.tau_hat, r.tau_ext, r.std]).all()
+    assert r.std_filter == pytest.approx(0.7)  # it begins anew
+
+
+def test_jitter_and_single_gaps_are_no_other_rate(plain):
+    random, k = np.random.default_rng(0), np.arange(2000)
+    for times in (k + random.uniform(-0.2, 0.2, len(k)), k[k % 10 > 0], k + 50 * (k // 20), 1.01 * k):
+        plain.restart()
+        assert set(steps(plain, times / RATE)) == {OK}
+
+
+def test_the_header_states_the_rate_and_the_period():
+    header = renderer("c")(export(DAVINCI, "independent")).files["model.h"]
+    assert "#define DF_RATE 100.0" in header
+    assert "#define DF_PERIOD 0.01" in header
+    assert "low-pass at 17 Hz" in header

@@ -15,6 +15,7 @@ from davinci_forces.filters import online, tracker
 from davinci_forces.filters.online import (
     BAD_INPUT,
     OK,
+    OTHER_RATE,
     OUTSIDE_VALIDITY,
     STARTING,
     LinkTree,
@@ -29,12 +30,13 @@ from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.mechanics.kinematics import jacobian
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.records import Choice, Contact, FilterNoise, Fit, JointModel, Motion, Track
+from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.stages.forces import stream as stage
 from tests import arm
 from tests.exported import ORIGIN, export, motion, motion_of
 
-T_S = 0.01
+T_S = 0.02
 
 
 @pytest.mark.parametrize("structure", ["independent", "coupled"])
@@ -196,7 +198,7 @@ from davinci_forces_stream.online import Stream
 stream = Stream(json.load(open("davinci_forces_stream/model.json")))
 n = len(stream.coordinates)
 for k in range(200):
-    e = stream.step(0.01 * k, [0.1 * math.sin(0.02 * k)] * n, [math.cos(0.1 * k)] * n)
+    e = stream.step(0.02 * k, [0.1 * math.sin(0.02 * k)] * n, [math.cos(0.1 * k)] * n)
 assert not {m.partition(".")[0] for m in sys.modules} & {"scipy", "numba", "pandas"}
 print(json.dumps([e.tau_ext.tolist(), e.std.tolist()]))
 """
@@ -208,15 +210,51 @@ print(json.dumps([e.tau_ext.tolist(), e.std.tolist()]))
     stream = Stream(small.document())
     n = len(stream.coordinates)
     for k in range(200):
-        e = stream.step(0.01 * k, [0.1 * np.sin(0.02 * k)] * n, [np.cos(0.1 * k)] * n)
+        e = stream.step(0.02 * k, [0.1 * np.sin(0.02 * k)] * n, [np.cos(0.1 * k)] * n)
     assert_allclose(json.loads(done.stdout), [e.tau_ext, e.std], rtol=1e-9)
 
 
 def test_joints_of_several_rates_or_without_a_filter_are_refused(small):
     document = small.document()
-    document["joints"][0]["filter"] |= {"rate": 77.0}
-    with pytest.raises(ValueError, match="need filters of one rate"):
+    document["joints"][0]["filter"] = {**document["joints"][0]["filter"], "rate": 77.0}
+    with pytest.raises(ValueError, match=r"have several rates \(50, 77 Hz\); export the model again"):
         Stream(document)
+    document["joints"][1]["filter"] = None
+    with pytest.raises(ValueError, match="the filter noise of hand_pitch; leave that joint out"):
+        Stream(document)
+
+
+def test_logs_of_several_rates_give_filters_of_the_lowest(lab, catalogue):
+    """A controller samples all joints at one rate; a filter runs at any, with the noise that was tuned."""
+    noises = [replace(n, rate=2 * n.rate) if n.joint == "hand_roll" else n for n in catalogue.records(FilterNoise)]
+    mixed = Catalogue(lambda kind: noises if kind is FilterNoise else catalogue.records(kind))
+    several = export_of(lab.study, mixed, ORIGIN)
+    assert several.document() == export_of(lab.study, catalogue, ORIGIN).document()
+    assert Stream(several.document()).rate == pytest.approx(1.0 / T_S)
+
+
+@pytest.mark.parametrize("faster", [10.0, 2.0, 1.04, 0.96, 0.6, 0.5, 0.1])
+def test_samples_at_another_rate_warn_and_give_no_number(small, faster):
+    stream = Stream(small.document())
+    rest = np.zeros(len(stream.coordinates))
+    times = np.arange(300) * T_S / faster
+    message = rf"samples come at {faster / T_S:.4g} Hz, the filter takes 50 Hz; resample .* or identify"
+    with pytest.warns(UserWarning, match=message) as warned:
+        estimates = [stream.step(t, rest, rest) for t in times]
+    assert len(warned) == 1
+    assert {e.status[0] for e in estimates[200:]} == {OTHER_RATE}
+    assert np.isnan([estimates[-1].tau_ext, estimates[-1].std]).all()
+    later = [stream.step(t, rest, rest) for t in times[-1] + T_S * np.arange(1, 900)]
+    assert list(dict.fromkeys(e.status[0] for e in later))[:2] == [OTHER_RATE, STARTING]
+    assert np.isfinite(later[-1].tau_ext).all()
+
+
+def test_jitter_and_single_gaps_are_no_other_rate(small):
+    random, k = np.random.default_rng(0), np.arange(2000)
+    for times in (k + random.uniform(-0.2, 0.2, len(k)), k[k % 10 > 0], k + 50 * (k // 20), 1.01 * k):
+        stream = Stream(small.document())
+        rest = np.zeros(len(stream.coordinates))
+        assert OTHER_RATE not in {stream.step(t * T_S, rest, rest).status[0] for t in times}
 
 
 def test_a_motion_that_is_later_than_the_effort_by_its_lag_needs_that_much_less_of_a_delay():

@@ -22,7 +22,9 @@ def render(export: Export) -> Rendering:
     if missing := [joint["name"] for joint in document["joints"] if not joint["filter"]]:
         raise BadRequest(f"{export.study.name}: no identification log gives the noise of the filter of {missing[0]}")
     head = export.head(*(fit for fit, _ in export.fits.values()))
+    rate, lowpass = document["joints"][0]["filter"]["rate"], export.study.settings.lowpass
     values = _values(document, [line.replace("*/", "* /").replace("??", "? ?") for line in head])
+    values |= {"RATE": _text(rate), "HZ": f"{rate:g}", "PERIOD": _text(1.0 / rate), "LOWPASS": f"{lowpass:g}"}
     files = {name: text_of(read_bytes(Path(__file__).with_name(name))) for name in ("model.h", "model.c")}
     for key, value in values.items():
         files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
@@ -76,7 +78,7 @@ def _bodies(model: Mapping[str, Any], links: list[Any]) -> list[Any]:
 
 def _filter(online: Mapping[str, Any]) -> list[Any]:
     band, numbers = online["band"] or NO_BAND, [online[name] for name in ("R", "Q", "initial_std")]
-    return [1.0 / online["rate"], *numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0]
+    return [*numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0]
 
 
 def _text(value: Any) -> str:

@@ -215,17 +215,21 @@ def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: S
 
 
 def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Motion]) -> dict[str, Any] | None:
-    """The default filter of a joint with its band and its alarm level, as far as free motion gives them."""
+    """The default filter of a joint with its band and its alarm level, as far as free motion gives them.
+
+    A controller samples all joints at one rate: the filters run at the lowest rate of the joints' identification logs.
+    """
     for tuned in catalogue.select(FilterNoise, joint=joint.name):
-        noise = noise_model(tuned, joint, 1.0 / tuned.rate, study.settings.q_tau)
-        R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, 1.0 / tuned.rate)
+        rate = min(noise.rate for noise in catalogue.records(FilterNoise))
+        noise = noise_model(tuned, joint, 1.0 / rate, study.settings.q_tau)
+        R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, 1.0 / rate)
         bands = [calibrate(free_errors(band, False)) for band in catalogue.select(ErrorBand, joint=joint.name)]
         spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
         unfitted = [space for space in spaces if space.role != "identification"] or spaces
         levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in unfitted]
         levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
-            "rate": tuned.rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],
+            "rate": rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],
             "initial_std": float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest])),
             "band": next(({"edges": b.edges.tolist(), "factor": b.factor.tolist(), "model_variance": b.model_variance}
                           for b in bands), None),

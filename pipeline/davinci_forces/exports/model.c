@@ -16,9 +16,12 @@ typedef struct { int parent, coordinate, slides; df_real T[3][4]; } Link;
 typedef struct {
     int row, set, terms;
     const Term *term;
-    df_real range[3][2], T, R[2], Q[3][3], start, edge[3], factor[4], model_variance, alarm;
+    df_real range[3][2], R[2], Q[3][3], start, edge[3], factor[4], model_variance, alarm;
 } Joint;
 enum { LINKS = @LINKS@ };
+enum { BEGINS = 1, RUNS };
+static const double GAP = 1.5, MEAN = 200, TOLERANCE = 0.02; /* periods in a gap, samples in the pace, and its error */
+static const df_real T = DF_PERIOD;
 static const df_real GRAVITY = @GRAVITY@, UP[3] = @UP@, STILL[DF_COORDINATES] = {0};
 static const Link CHAIN[LINKS] = @CHAIN@;
 static const df_real BODIES[][LINKS][10] = @BODIES@;
@@ -111,7 +114,7 @@ df_status df_effort(int j, const df_state *s, const df_real *q, const df_real *d
 df_status df_bias(int j, const df_state *s, const df_real *q, const df_real *dq, df_real *tau) { return df_effort(j, s, q, dq, STILL, tau); }
 
 df_status df_gravity(int j, const df_real *q, df_real *tau) {
-    const df_state still = {0, 0, {0}, {0}};
+    const df_state still = {0, 0, 0, {0}, {0}};
     const df_status status = df_effort(j, &still, q, STILL, STILL, tau);
     if (status != DF_BAD_INPUT) *tau = limited(*tau, MODEL[j].range[2][0], MODEL[j].range[2][1]);
     return status;
@@ -146,7 +149,7 @@ static void correct(const Joint *m, df_real *x, const df_real *y) {
 /* x + T f + T^2/2 A f with f = [dq, (drive - b) / M, 0], and P = F P F' + Q with F = I + T A + T^2/2 A^2. */
 static void predict(const Joint *m, df_real *x, df_real drive, df_real M) {
     const df_real P[3][3] = {{x[3], x[4], x[5]}, {x[4], x[6], x[7]}, {x[5], x[7], x[8]}}, q = x[0], dq = x[1];
-    const df_real T = m->T, h = 0.5 * T * T, sure = erf(dq / sqrt(2 * x[6] + 1e-300));
+    const df_real h = 0.5 * T * T, sure = erf(dq / sqrt(2 * x[6] + 1e-300));
     df_real c[6] = {0}, B[3][3], *out = x + 3;
     FOR(i, m->terms) for (int k = m->set >= 0 ? 4 : 0; k < 6; k++) c[k] += m->term[i].value * m->term[i].c[k];
     const df_real A_q = -(c[1] * cos(q) - c[2] * sin(q) + c[3]) / M, A_dq = -c[4] / M, v = T + h * A_dq, d = T * c[5] / M;
@@ -162,9 +165,18 @@ df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
     GUARD(in->q, in->dq, in->ddq)
     const df_real y[4] = {in->q_measured, in->dq_measured, in->tau, in->t}, q = in->q[m->row], dq = in->dq[m->row];
     FOR(i, 4) if (!isfinite(y[i]) || (s->runs && in->t <= s->t)) return DF_BAD_INPUT;
-    if (!s->runs || in->t - s->t > 1.5 * m->T) {
-        const df_state first = {1, 0, {0}, {y[0], y[1], 0, 1e6 * m->R[0], 0, 0, 1e6 * m->R[1], 0, m->start * m->start}};
+    /* pace: mean interval over the period, minus 1.  A gap counts if it follows another, and then as the shortest gap. */
+    const double interval = (in->t - s->t) / DF_PERIOD;
+    if (s->runs == BEGINS || (s->runs && interval <= GAP)) s->pace += (fmin(interval, GAP) - 1 - s->pace) / MEAN;
+    const int other_rate = fabs(s->pace) > TOLERANCE;
+    if (!s->runs || other_rate || interval > GAP) {
+        const df_state first = {BEGINS, in->t, s->pace, {0}, {y[0], y[1], 0, 1e6 * m->R[0], 0, 0, 1e6 * m->R[1], 0, m->start * m->start}};
         *s = first;
+    } else s->runs = RUNS;
+    if (other_rate) {
+        const df_result unknown = {NAN, NAN, NAN, NAN, -1};
+        *out = unknown;
+        return DF_OTHER_RATE;
     }
     df_real M, known;
     int speed = 0;
@@ -177,7 +189,7 @@ df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
     FOR(i, m->terms) {
         const Term *p = &m->term[i];
         known += p->value * (m->set >= 0 ? -p->c[4] * dq - p->c[5] * sign(dq) : p->c[6] * state(p, s->z[i], q, dq));
-        if (p->kind == 1) s->z[i] = sign(dq) - (sign(dq) - s->z[i]) * exp(-fabs(dq) * m->T / p->scale);
+        if (p->kind == 1) s->z[i] = sign(dq) - (sign(dq) - s->z[i]) * exp(-fabs(dq) * T / p->scale);
     }
     predict(m, s->x, in->tau - known, M);
     return status;

@@ -1,7 +1,16 @@
 /*
 @HEAD@
- * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them,
- * low-passed and delayed as below.  The standard deviation leaves out what a filter's delay costs.
+ * df_step takes samples at DF_RATE, @HZ@ Hz.  A single gap restarts the filter.  Samples at another rate, by 2 % on
+ * average or gap after gap, give DF_OTHER_RATE with NaN: resample them, or identify from logs at their rate.
+ * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them.
+ * q is the position after a Butterworth low-pass of order 4 that runs forwards and backwards: no delay, half the
+ * amplitude at the cutoff, no effect if that is at least 0.4 DF_RATE.  dq is the central difference of q, or the measured
+ * velocity after the same low-pass; ddq is the central difference of dq.
+ * q_measured is the position without low-pass, dq_measured the measured velocity likewise; if only positions are
+ * measured, it is the central difference of the position after the same low-pass at @LOWPASS@ Hz.
+ * The effort lags the motion, so q, dq, ddq, q_measured and dq_measured are delayed by the lag before they meet tau.  If
+ * a causal low-pass delays q by D, delay q_measured and dq_measured to the same instant, and tau by D minus the lag.
+ * The standard deviation leaves out what such a delay costs.  Cutoff and lag:
 @PROCESSING@
  * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
  * one standard error, never more than the motion loses.  Both are limited to the largest effort recorded.
@@ -16,10 +25,12 @@ typedef float df_real; /* compiled as C with -DDF_FLOAT: results to four digits 
 #else
 typedef double df_real;
 #endif
+#define DF_RATE @RATE@ /* [Hz] */
+#define DF_PERIOD @PERIOD@ /* [s] */
 enum { DF_COORDINATES = @N@, DF_STATES = @STATES@ };
 enum { @JOINTS@, DF_JOINTS };
-typedef enum { DF_OK, DF_OUTSIDE_VALIDITY, DF_BAD_INPUT } df_status; /* bad input leaves everything as it was */
-typedef struct { int runs; double t; df_real z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
+typedef enum { DF_OK, DF_OUTSIDE_VALIDITY, DF_BAD_INPUT, DF_OTHER_RATE } df_status; /* bad input leaves everything as it was */
+typedef struct { int runs; double t, pace; df_real z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
 typedef struct { double t; df_real tau, q_measured, dq_measured, q[DF_COORDINATES], dq[DF_COORDINATES], ddq[DF_COORDINATES]; } df_sample;
 typedef struct { df_real tau_hat, tau_ext, std_filter, std; int contact; } df_result; /* contact: -1 where no level is known */
 df_status df_inertia(int joint, const df_real *q, df_real *inertia);
@@ -27,7 +38,7 @@ df_status df_bias(int joint, const df_state *s, const df_real *q, const df_real 
 df_status df_gravity(int joint, const df_real *q, df_real *tau);
 df_status df_friction(int joint, const df_state *s, const df_real *q, const df_real *dq, df_real *tau);
 df_status df_effort(int joint, const df_state *s, const df_real *q, const df_real *dq, const df_real *ddq, df_real *tau);
-df_status df_step(int joint, df_state *s, const df_sample *sample, df_result *result); /* a gap restarts the filter */
+df_status df_step(int joint, df_state *s, const df_sample *sample, df_result *result);
 #ifdef __cplusplus
 }
 #endif

@@ -8,6 +8,7 @@ Exports copy this file and `sample`; they need numpy alone, and Python 3.10 or l
 """
 
 import math
+import warnings
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,10 +22,13 @@ from davinci_forces.filters.sample import correct, first, predict, sign, transit
 
 Array = NDArray[Any]  # of floats
 OK, STARTING, OUTSIDE_VALIDITY, BAD_INPUT = "ok", "starting", "outside validity", "bad input"
+OTHER_RATE = "other rate"
 FUNCTIONS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")  # of the coefficients of a term
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 ORDER = 3  # of the polynomial through the samples of a window
 GAP = 1.5  # sampling times; a longer wait restarts the filter
+PACE_SAMPLES = 200  # over which the mean sampling time is taken, so that jitter averages out
+MAX_PACE_ERROR = 0.02  # of the sampling time; measured: it moves an estimate by less than its standard deviation
 STILL = 3.0  # standard deviations of the velocity's noise, below which a joint stands still
 DOUBTFUL = 0.67  # likewise, below which the sign of the velocity is that of its noise
 YZX, ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -48,8 +52,9 @@ Z_OF_MOTION: dict[str, Callable[[float, float], float]] = {
 class OnlineEffort:
     """The external efforts on the joints (m,) at time t [s], which is `delay` before the newest sample.
 
-    While the first window fills, and where the status of a joint is "bad input", numbers are NaN.  `contact` is 1 above
-    the alarm level, 0 below, and -1 without a level.  `force` (3,) [N] is at the tip, in base axes; NaN where unknown.
+    Numbers are NaN while the first window fills, and where the status of a joint is "bad input" or "other rate".
+    `contact` is 1 above the alarm level, 0 below, and -1 without a level.  `force` (3,) [N] is at the tip, in base
+    axes; NaN where unknown.
     """
 
     t: float
@@ -314,23 +319,27 @@ class Stream:
 
     def __init__(self, model: Mapping[str, Any]) -> None:
         joints, models = model["joints"], model["models"]
-        rates = {round(j["filter"]["rate"], 9) for j in joints if j["filter"]}
-        if len(rates) != 1 or any(not j["filter"] for j in joints):
-            raise ValueError(f"the joints {', '.join(j['name'] for j in joints)} need filters of one rate")
+        if missing := [j["name"] for j in joints if not j["filter"]]:
+            raise ValueError(f"no identification log gives the filter noise of {missing[0]}; leave that joint out")
+        rates = sorted({j["filter"]["rate"] for j in joints})
+        if len(rates) != 1:
+            listed = ", ".join(f"{rate:g}" for rate in rates)
+            raise ValueError(f"the filters of the joints have several rates ({listed} Hz); export the model again")
         every, chain = list(model["coordinates"]), model["chain"] or {"links": [], "up": [0.0, 0.0, 1.0], "tip": None}
         names = [j["name"] for j in joints]
         coupled = any(models[j["model"]]["structure"] == "coupled" for j in joints)
         self.coordinates, self.joints = tuple(every if coupled else names), tuple(names)
         self.links = LinkTree(chain, model["gravity"])
         self.filters = [OnlineJoint(j, models[j["model"]], self.coordinates, self.links) for j in joints]
-        self.rate, self.offset = float(joints[0]["filter"]["rate"]), np.zeros(len(names))
+        self.rate, self.offset = float(rates[0]), np.zeros(len(names))
         self.has_tip = names == every and len(every) == 3 and self.links.tip is not None
         self.has_tip = self.has_tip and all(j["units"]["effort"] in ("N m", "N") for j in joints)
         processing = [(self.rate, j["motion"]["cutoff"], j["motion"]["effort_lag"]) for j in joints]
         self.delay = max(delay_of(processing), 0.0)
         self._windows = [Window.design(rate, cutoff, self.delay + lag) for rate, cutoff, lag in processing]
         self._samples: deque[Any] = deque(maxlen=max(w.middle + w.half + 1 for w in self._windows))
-        self._t = -math.inf
+        self._t, self._pace = -math.inf, 0.0  # pace: mean time between samples over the filter's, minus 1
+        self._latest: deque[float] = deque(maxlen=5)  # times
 
     def restart(self) -> None:
         """Forget all samples, as after a gap."""
@@ -342,7 +351,9 @@ class Stream:
         """Take a sample at t [s]: positions, efforts and, if the arm measures them, velocities over `coordinates`.
 
         A sample that is not finite, or not later than the one before, leaves everything as it was.  After a gap of
-        more than 1.5 sampling times, the filter starts anew.  Give `dq` always or never.
+        more than 1.5 sampling times, the filter starts anew.  Samples at another rate than the filter's, by 2 % on
+        average or gap after gap, have the status "other rate", and a warning names both rates.  Give `dq` always or
+        never.
         """
         sample = [np.array(x, float).ravel() for x in (q, tau, dq) if x is not None]
         if any(len(x) != len(self.coordinates) for x in sample):
@@ -350,13 +361,32 @@ class Stream:
         used = [sample[0], sample[1][[joint.row for joint in self.filters]], *sample[2:]]
         if not (math.isfinite(t) and t > self._t and all(np.isfinite(x).all() for x in used)):
             return self._unknown(t, BAD_INPUT)
-        if t - self._t > GAP / self.rate:
+        other_rate, gap = self._follow_rate(t), t - self._t > GAP / self.rate
+        if other_rate or gap:
             self.restart()
         self._t = t
         self._samples.append(sample)
+        if other_rate:
+            return self._unknown(t, OTHER_RATE)
         if len(self._samples) < self._samples.maxlen:  # type: ignore[operator]
             return self._unknown(t, STARTING)
         return self._estimate(t - self.delay)
+
+    def _follow_rate(self, t: float) -> bool:
+        """Update the pace; return whether samples come at another rate, and warn when that begins.
+
+        A gap counts if it follows another, and then as the shortest gap.
+        """
+        before, interval = abs(self._pace) > MAX_PACE_ERROR, (t - self._t) * self.rate
+        self._latest.append(t)
+        if interval <= GAP or len(self._samples) == 1:
+            self._pace += (min(interval, GAP) - 1.0 - self._pace) / PACE_SAMPLES
+        other = abs(self._pace) > MAX_PACE_ERROR
+        if other and not before:
+            rate = (len(self._latest) - 1) / (self._latest[-1] - self._latest[0])
+            remedy = "resample them to the rate of the filter, or identify the model from logs at theirs"
+            warnings.warn(f"samples come at {rate:.4g} Hz, the filter takes {self.rate:.4g} Hz; {remedy}", stacklevel=3)
+        return other
 
     def _unknown(self, t: float, status: str) -> OnlineEffort:
         m = len(self.joints)
