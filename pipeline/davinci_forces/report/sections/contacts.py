@@ -29,12 +29,11 @@ def section(context: Context) -> Iterator[Block]:
             "motion like that of the logs crosses this level at most once in ten minutes. Onset and release are the "
             "times at which the effort leaves zero and returns to it. Mean and impulse (mean times time) are those of "
             "measured minus modelled effort, which no smoothing moves out of the window. The peak is the largest "
-            "external effort in the window, or the mean if smoothing flattens a short push below it. Standard errors "
-            "are the spread over windows of the same length in free space; that of an impulse includes those of onset "
-            "and release if no window is stated, and those are at least what they lie outside a stated window. That "
-            "of a peak also includes the smoother's standard deviation there, and the height by which smoothing "
-            "flattens the peak. Peaks are judged by the lower detection level: 99 % of the samples of the joint's "
-            f"worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
+            "external effort in the window, and at least the mean. Standard errors are the spread over windows of the "
+            "same length in free space; that of an impulse includes those of onset and release if no window is "
+            "stated. That of a peak also includes the smoother's standard deviation there, and the height by which "
+            "smoothing flattens the peak. Peaks are judged by the lower detection level: 99 % of the samples of the "
+            f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(context, contacts)
         caption = (
