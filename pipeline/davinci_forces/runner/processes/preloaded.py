@@ -12,7 +12,3 @@ from davinci_forces.stages import STAGES, module  # noqa: E402
 
 for name in STAGES:
     import_module(module(name))
-
-# Stages import these where they call them, as most commands do without: here once, and not once a worker.
-for library in ("scipy.signal", "statsmodels.tsa.stattools"):
-    import_module(library)
