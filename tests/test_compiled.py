@@ -116,11 +116,11 @@ def test_a_module_that_is_inlined_gives_its_new_numbers_even_where_its_time_is_o
     user = environment(tmp_path, PYTHONPATH=str(package.parent))
     before, _, first = printed(KERNEL, user)
     assert printed(KERNEL, user) == [before, "1", first]  # compiled once
-    bias = package / "maths" / "models" / "bias.py"
-    code = bias.read_text()
+    terms = package / "maths" / "models" / "terms.py"
+    code = terms.read_text()
     assert code.count("return sign - (sign - z)") == 1
-    bias.write_text(code.replace("return sign - (sign - z)", "return sign + (sign - z)"))
-    os.utime(bias, (0, time.time() - 86400))
+    terms.write_text(code.replace("return sign - (sign - z)", "return sign + (sign - z)"))
+    os.utime(terms, (0, time.time() - 86400))
     after, hits, second = printed(KERNEL, user)
     assert float(after) > 1.0 > float(before)
     assert hits == "0"

@@ -221,12 +221,12 @@ if __name__ == "__main__":
     main()
 """
 DRAWING = """
-from davinci_forces.report import writers
-typeset = writers.renderer
-def say_and_render(ending):
+from davinci_forces.report.writers import pdf
+render = pdf.render
+def say_and_render(document):
     print("drawn", flush=True)
-    return typeset(ending)
-writers.renderer = say_and_render
+    return render(document)
+pdf.render = say_and_render
 """
 STOPPED = "stopped; run again to continue\n"
 

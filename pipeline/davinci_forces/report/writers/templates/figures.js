@@ -89,7 +89,7 @@ for (const figure of document.querySelectorAll("figure:has(> script.numbers)")) 
   const name = figure.querySelector("figcaption a").textContent.replace(/\W+$/, "");
   const file = `${document.title.split(" – ")[0]}-${name}`.toLowerCase().replace(/[^a-z0-9.]+/g, "-");
   toolsOf(figure).append(
-    newButton("SVG", `${name} as a drawing for a paper`, () => save(drawing(figure), `${file}.svg`, "image/svg+xml", "")),
+    newButton("SVG", `${name} as SVG, a drawing for a paper`, () => save(drawing(figure), `${file}.svg`, "image/svg+xml", "")),
     newButton("CSV", `Numbers of ${name} as CSV`, () => save(csv(numbersOf(figure)), `${file}.csv`)),
   );
 }
