@@ -201,6 +201,7 @@ def test_a_table_that_goes_on_beyond_its_right_edge_fades_there_until_it_is_scro
     browser: Browser, file: Path
 ) -> None:
     browser.open(file, width=1280)
+    browser.settle()
     table, faded = "document.querySelector('#runs .scroll')", "matches('.cut')"
     assert browser.run(f"{table}.scrollWidth > {table}.clientWidth && {table}.{faded}")
     browser.run(f"{table}.scrollLeft = {table}.scrollWidth")

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.maths.periods.harmonics import largest_omitted
 from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Spectrum, Track, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
@@ -234,7 +233,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
-    shares = [largest_omitted(s.amplitude, s.harmonics)[1] for s in context.catalogue.records(Spectrum)]
+    omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     warnings = (
         (diagnostic.stage, text)
         for diagnostic in context.catalogue.records(Diagnostic)
@@ -242,9 +241,15 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         if severity == "warning"
     )
     for stage, text in first_of_each_kind(warnings):
-        by_size = max(shares, default=0.0) / verdicts.GOOD if stage == "differentiate" else WARNING
+        by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
         weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size
         yield weight, literal(text.replace("`", ""))
+
+
+def omitted_share(spectrum: Spectrum) -> float:
+    """The largest harmonic that is not kept, over the largest of all; 0 if all are kept."""
+    omitted = spectrum.amplitude[spectrum.harmonics + 1 :].max(initial=0.0)
+    return float(omitted / (spectrum.amplitude[1:].max(initial=0.0) or 1.0))
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
