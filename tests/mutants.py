@@ -23,6 +23,7 @@ import pytest
 
 from davinci_forces.maths.compiled import SOURCES
 from davinci_forces.runner.fingerprint import code
+from davinci_forces.runner.processes import arithmetic
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "pipeline/davinci_forces"
@@ -134,7 +135,7 @@ class Tree:
         shutil.copytree(ROOT, self.root, ignore=left_out)
         for name in ("processed", "reports"):
             (self.root / name).mkdir()
-        self.environment = os.environ | {
+        self.environment = os.environ | arithmetic.blas_variables() | {  # this module loads numpy before tests pin it
             "PYTHONDONTWRITEBYTECODE": "",
             "PYTHONPATH": str(self.root / "pipeline"),
             "NUMBA_CACHE_DIR": str(folder / "compiled"),
