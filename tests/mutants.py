@@ -135,7 +135,8 @@ class Tree:
         shutil.copytree(ROOT, self.root, ignore=left_out)
         for name in ("processed", "reports"):
             (self.root / name).mkdir()
-        self.environment = os.environ | arithmetic.blas_variables() | {  # this module loads numpy before tests pin it
+        self.environment = os.environ | arithmetic.blas_variables()  # this module loads numpy before tests pin it
+        self.environment |= {
             "PYTHONDONTWRITEBYTECODE": "",
             "PYTHONPATH": str(self.root / "pipeline"),
             "NUMBA_CACHE_DIR": str(folder / "compiled"),
