@@ -75,6 +75,18 @@ def test_the_number_of_joints_is_told_whatever_comes_after_the_velocities(joints
     assert found.rate == pytest.approx(1.0 if timed else RATE, rel=0.01)
 
 
+def test_efforts_are_currents_where_another_block_is_the_same_but_larger():
+    rng = np.random.default_rng(2)
+    currents, other = rng.normal(size=(2, 3, 500))
+    torques = np.array([[11.0], [12.0], [5.0]]) * currents
+    moves = (0, 1, 2)
+    assert columns.is_current(currents, [torques], moves)
+    assert columns.is_current(currents + 0.01, [other, torques], moves)
+    assert not columns.is_current(currents, [other, -torques], moves)  # another motion, or the other way round
+    assert not columns.is_current(currents, [1.5 * currents, 0.1 * currents], moves)  # the same in other units
+    assert not columns.is_current(currents, [np.vstack([torques[:1], other[1:]])], moves)  # one joint alone
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(3, 24), st.integers(0, 100))
 def test_noise_is_no_block_of_velocities(width, seed):

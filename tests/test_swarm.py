@@ -153,6 +153,19 @@ def test_every_robot_has_a_fit_by_it_and_a_record_of_the_search():
     assert [r.walls for r in made if isinstance(r, SwarmSearch)] == ["reflecting", "clipping"]
 
 
+def test_samples_of_a_single_period_count_in_the_error_of_a_search_and_missing_ones_do_not():
+    whole = trajectory(arm.signal("hand_roll"))
+    gap = np.arange(len(whole.t)) < 50
+
+    def error(log):
+        (search, _) = (r for r in fit.run([log], [], arm.ARM, lowpass=17.0) if isinstance(r, SwarmSearch))
+        return search.mse_std
+
+    spoilt = replace(whole, count=np.where(gap, 0, whole.count), tau=whole.tau + 1e6 * gap)
+    assert error(replace(whole, count=np.ones_like(whole.count))) == pytest.approx(error(whole), rel=1e-3)
+    assert error(spoilt) == pytest.approx(error(whole), rel=0.5)
+
+
 def test_a_box_around_least_squares_holds_the_best_parameters_however_far_below_zero_those_are():
     p = problem("instrument_slide", (2.5626, -3.0, 3.2723, 3.984), known=False)
     box, best = pso.box_around(p.triangle, p), solve_bounded(p.triangle, p.known.positive)

@@ -28,6 +28,8 @@ def test_the_shortest_run_in_that_keeps_the_limits_of_acceleration_is_taken():
     peaks = [np.abs(run_in(SERIES, np.linspace(-d, 0, 20_000), d)[2]).max() for d in durations]
     first = next(d for d, peak in zip(durations, peaks, strict=True) if peak <= 0.6)
     assert durations[0] < first < durations[-1]
+    just = 1.0001 * peaks[durations.tolist().index(first)]  # a limit that this run-in keeps by a hair
+    assert shortest_run_in([SERIES], [(-just, just)], durations) == first
     assert shortest_run_in([SERIES], [limits], durations) == first
     assert shortest_run_in([SERIES, SERIES], [(-9.0, 9.0), limits], durations) == first
 

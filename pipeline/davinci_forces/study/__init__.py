@@ -7,6 +7,7 @@ from typing import Any
 
 from davinci_forces.haptics.scenario import HapticScenario as HapticScenario
 from davinci_forces.logs.log import Options as Options
+from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.robots.robot import Robot
 
 WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
@@ -20,7 +21,7 @@ class Settings:
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0: the smallest that follows a push
-    delay: float = 0.1  # [s] by which the filter may show a push late, where q_tau is not stated
+    delay: float = PUSH_DELAY  # [s] by which the filter may show a push late, where q_tau is not stated
     effort: dict[str, float] = field(default_factory=dict)  # external effort to be detected on each joint [effort]
 
 
