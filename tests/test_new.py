@@ -85,6 +85,9 @@ def test_efforts_are_currents_where_another_block_is_the_same_but_larger():
     assert not columns.is_current(currents, [other, -torques], moves)  # another motion, or the other way round
     assert not columns.is_current(currents, [1.5 * currents, 0.1 * currents], moves)  # the same in other units
     assert not columns.is_current(currents, [np.vstack([torques[:1], other[1:]])], moves)  # one joint alone
+    measured = np.vstack([currents[:1], other[1:]])  # two joints stand still: the commanded currents tell of them
+    assert columns.is_current(measured, [1.2 * currents, torques], (0,))
+    assert not columns.is_current(measured, [1.2 * currents, torques], (0, 1))
 
 
 @settings(max_examples=25, deadline=None)
