@@ -22,7 +22,7 @@ if (
     signal.getsignal(signal.SIGINT) == signal.SIG_IGN
 ):  # as of a run in the background, whose children would pass it over
     signal.signal(signal.SIGINT, signal.default_int_handler)
-IN_MEMORY, ROOM = Path("/dev/shm"), 8e9  # [bytes]; a run holds up to 2e9 at a time
+IN_MEMORY, ROOM = Path("/dev/shm"), 3e9  # [bytes]; a run holds a sixth of it at a time
 if "TMPDIR" not in os.environ and IN_MEMORY.is_dir() and shutil.disk_usage(IN_MEMORY).free > ROOM:
     # A run makes and removes 36,000 small files, for which a file system on a disk takes a fifth of the CPU time.
     os.environ["TMPDIR"] = tempfile.tempdir = str(IN_MEMORY)
@@ -52,8 +52,17 @@ QUICK_DESIGN = {
 # Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
 # itself, with `@pytest.mark.medium`.
 MEDIUM: dict[str, tuple[str, ...]] = {
+    "contracts/test_approved.py": (),
+    "contracts/test_estimators.py": (),
+    "contracts/test_exports.py": (),
     "contracts/test_formats.py": ("test_a_file_that_was_cut_gives_whole_rows_or_a_clear_error",),
     "contracts/test_sections.py": (),
+    "contracts/test_stream.py": (),
+    "haptics/test_limit.py": (),
+    "haptics/test_stability.py": (),
+    "logs/test_labview_files.py": (
+        "test_a_file_of_each_kind_cut_at_every_other_byte_gives_whole_rows_or_a_clear_error",
+    ),
     "logs/test_lvm.py": (
         "test_any_table_cut_at_any_byte_gives_whole_rows_or_a_clear_error",
         "test_blocks_of_any_size_give_the_same_samples",
@@ -62,12 +71,12 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of_it",
         "test_the_effort_of_a_coupled_arm_is_that_of_its_links_drives_and_friction",
     ),
-    "robot/test_kernels.py": (),
-    "logs/test_labview_files.py": (
-        "test_a_file_of_each_kind_cut_at_every_other_byte_gives_whole_rows_or_a_clear_error",
-    ),
+    "new/test_dialects.py": (),
+    "report/test_campaign.py": (),
+    "report/test_joint_pages.py": (),
     "report/test_report_figures.py": ("test_another_process_gives_the_same_bytes",),
     "report/test_report_html.py": ("test_a_dozen_long_traces_stay_under_five_megabytes",),
+    "robot/test_kernels.py": (),
     "robot/test_rigid_body.py": (
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[6]",
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[7]",
@@ -89,9 +98,16 @@ MEDIUM: dict[str, tuple[str, ...]] = {
     "simulation/test_friction.py": (),
     "simulation/test_simulation_plant.py": (),
     "simulation/test_simulation_step.py": (),
+    "test_arrays.py": (),
     "test_bad_logs.py": ("test_names_that_are_markup_appear_as_text_in_both_reports",),
+    "test_clock_faults.py": (),
+    "test_consistent.py": (),
     "test_design.py": (),
-    "test_estimation.py": ("test_parameters_are_found_as_well_as_they_claim_to_be",),
+    "test_error_band.py": (),
+    "test_estimation.py": (),
+    "test_force_sensor.py": (),
+    "test_new.py": (),
+    "test_period.py": (),
     "test_real_data.py": (),
     "test_robustness.py": (
         "test_a_missing_file_costs_its_own_log_and_no_other",
@@ -102,7 +118,13 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_verify_passes_over_files_that_are_no_entries",
     ),
     "test_runs.py": (),
+    "test_sizes.py": (),
+    "test_small_files.py": (),
+    "test_tampering.py": (),
+    "test_total_least_squares.py": (),
     "test_verified_runs.py": (),
+    "test_weighing.py": (),
+    "test_whiteness.py": (),
 }
 
 # Tests that `make test` leaves to `--slow`, which continuous integration runs: for every test of a file, or with a

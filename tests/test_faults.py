@@ -40,7 +40,8 @@ def test_a_disk_that_takes_no_more_is_said_and_leaves_no_partial_file(raw, large
     """Files may not grow beyond a size, as on a full disk: a record cannot be finished, nor a diagnostic."""
     folder = small(raw / "lab", ("one",))
     command = [sys.executable, "-c", LIMITED, str(largest), "ingest", str(folder)]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}  # Python would keep modules that were cut
+    ran = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert ran.returncode == 1
     assert "File too large" in ran.stderr
     assert "fault of davinci-forces" not in ran.stderr
