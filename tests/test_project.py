@@ -6,6 +6,8 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
+from importlib.util import find_spec
 
 import pytest
 
@@ -120,3 +122,14 @@ def test_benchmarks_run_only_where_they_are_asked_for():
     assert asked not in collected("tests", *others)
     assert asked in collected("tests", "--full", *others)
     assert asked in collected("tests/benchmarks/test_simulation.py")
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("file", sorted((ROOT / "tests" / "benchmarks").glob("*.py")), ids=lambda file: file.name)
+def test_what_benchmarks_import_is_there(file):
+    """Also in the code that they give to other processes; continuous integration runs no benchmark."""
+    for module, brackets, bare in re.findall(
+        r"\bfrom (davinci_forces[\w.]*) import (?:\(([^)]*)\)|([\w, ]+))", file.read_text()
+    ):
+        for name in re.findall(r"(\w+)(?: as \w+)?", brackets or bare):
+            assert hasattr(import_module(module), name) or find_spec(f"{module}.{name}"), f"{module} has no {name}"

@@ -12,7 +12,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.filters import tracker
-from davinci_forces.filters.ekf import track
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
 from davinci_forces.filters.stepping import covariances
@@ -22,6 +21,7 @@ from davinci_forces.records.store import Writer
 
 N = 1_000_000
 AT_MOST = 1.2  # times the time of C++ -O3
+EKF = tracker("ekf")
 NOISE = NoiseModel(1e-4, 1e-3, 1e-5, 1e-3, 0.05)
 
 
@@ -49,7 +49,7 @@ def recording() -> FilterInput:
 
 
 def track_in_cpp(loop, recording):
-    """What `track` does, with the loop in C++: the same arrays made, the same arrays filled."""
+    """What the filter does, with the loop in C++: the same arrays made, the same arrays filled."""
     joint = recording.joint
     drive, out = recording.tau - joint.known, np.empty((7, N))
     short = np.array(joint.coefficients), np.array(NOISE)
@@ -82,19 +82,19 @@ def said(capsys, text: str) -> None:
 
 
 def test_a_million_samples_take_at_most_a_fifth_longer_than_in_cpp(rival, capsys):
-    ours = track(recording(), NOISE)  # compiles, or reads what was compiled
+    ours = EKF(recording(), NOISE)  # compiles, or reads what was compiled
     for a, b in zip(ours, track_in_cpp(rival, recording()), strict=True):
         assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max())
-    mine, theirs = shortest(lambda made: track(made, NOISE), lambda made: track_in_cpp(rival, made))
+    mine, theirs = shortest(lambda made: EKF(made, NOISE), lambda made: track_in_cpp(rival, made))
     said(capsys, f"filter of 1e6 samples: {mine / theirs:.2f} times the time of C++ -O3")
     assert mine <= AT_MOST * theirs
 
 
 def test_the_smoother_takes_at_most_two_and_a_half_times_as_long_as_the_filter(capsys):
-    filter_, smoother = (f(recording(), NOISE) for f in (track, tracker("rts")))  # compiles, or reads what was compiled
+    filter_, smoother = (f(recording(), NOISE) for f in (EKF, tracker("rts")))  # compiles, or reads what was compiled
     assert_allclose(smoother.tau_ext[-1], filter_.tau_ext[-1], rtol=1e-9)  # the last sample has nothing after it
     assert smoother.tau_ext_std[N // 2] < filter_.tau_ext_std[N // 2]
-    filtered, smoothed = shortest(lambda made: track(made, NOISE), lambda made: tracker("rts")(made, NOISE))
+    filtered, smoothed = shortest(lambda made: EKF(made, NOISE), lambda made: tracker("rts")(made, NOISE))
     said(capsys, f"filter and smoother of 1e6 samples: {smoothed / filtered:.2f} times the filter")
     assert smoothed <= 2.5 * filtered
 
@@ -102,7 +102,7 @@ def test_the_smoother_takes_at_most_two_and_a_half_times_as_long_as_the_filter(c
 def test_the_filter_is_three_hundred_times_as_fast_as_filterpys(capsys):
     kalman = pytest.importorskip("filterpy.kalman", reason="filterpy is not installed: `make oracles`")
     few, data = 3000, recording()
-    track(data, NOISE)  # compiles, or reads what was compiled
+    EKF(data, NOISE)  # compiles, or reads what was compiled
     filtered: list[float] = []
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1e-3)
 
@@ -118,7 +118,7 @@ def test_the_filter_is_three_hundred_times_as_fast_as_filterpys(capsys):
             filtered.append(float(ekf.x[0, 0]))
             ekf.predict()
 
-    (own,), rival = shortest(lambda made: track(made, NOISE)), seconds(theirs) / few
+    (own,), rival = shortest(lambda made: EKF(made, NOISE)), seconds(theirs) / few
     assert_allclose(filtered, data.q[:few], rtol=0, atol=0.02)  # it followed what was measured
     said(capsys, f"a sample of the filter: 1/{rival * N / own:.0f} of filterpy's; {N} samples")
     assert rival >= 300 * own / N
@@ -127,7 +127,7 @@ def test_the_filter_is_three_hundred_times_as_fast_as_filterpys(capsys):
 def test_storing_a_track_takes_at_most_six_times_as_long_as_filtering_it(tmp_path, capsys):
     def record() -> Track:
         made = recording()
-        columns = dict.fromkeys(Track.columns(), made.tau) | {"t": np.arange(N) * 1e-3} | track(made, NOISE)._asdict()
+        columns = dict.fromkeys(Track.columns(), made.tau) | {"t": np.arange(N) * 1e-3} | EKF(made, NOISE)._asdict()
         scalars = dict.fromkeys(Track.scalars(), 0.0) | dict.fromkeys(("log", "joint", "model", "estimator"), "x")
         return Track(**scalars | columns | {"filter": "ekf", "role": "contact", "path": "", "band_from": ""})
 
@@ -139,7 +139,7 @@ def test_storing_a_track_takes_at_most_six_times_as_long_as_filtering_it(tmp_pat
         anew = record()
         return seconds(lambda: store(anew))
 
-    (filtered,) = shortest(lambda made: track(made, NOISE))
+    (filtered,) = shortest(lambda made: EKF(made, NOISE))
     stored = min(seconds_of_storing() for _ in range(9))
     [file] = tmp_path.rglob("*.parquet")
     assert_allclose(pq.read_table(file, columns=["tau_ext"])["tau_ext"], record().tau_ext, rtol=0, atol=0)

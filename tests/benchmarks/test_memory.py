@@ -35,10 +35,11 @@ arrays.BLOCK_SAMPLES = int(sys.argv.pop(1))  # before others import it
 from davinci_forces.logs.isolated import process
 import davinci_forces
 from davinci_forces.commands.inspect import describe
+from davinci_forces.logs.log import Options
 if sys.argv[1] == "run":
     assert davinci_forces.run(sys.argv[2], *sys.argv[3:], quiet=True)
 else:
-    describe(Path(sys.argv[2]), 5)
+    describe(Path(sys.argv[2]), 5, Options())
 process.close_all()
 [line] = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM")]
 print(int(line.split()[1]) / 1024, getrusage(RUSAGE_CHILDREN).ru_maxrss / 1024)

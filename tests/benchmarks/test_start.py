@@ -34,14 +34,14 @@ assert abs(loop(np.ones(4000)) - 10.0) < 1e-9
 """
 FILTER = """
 import numpy as np
-from davinci_forces.filters.ekf import track
+from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.problem import FilterInput
 from davinci_forces.maths.models.model import JointDynamics
 t = np.arange(4000) * 1e-3
 joint = JointDynamics(np.full(4000, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(4000))
 noise = NoiseModel(1e-4, 1e-3, 1e-5, 1e-3, 0.05)
-tracked = track(FilterInput(joint, np.sin(t), np.cos(t), -np.sin(t), np.sin(t), 1e-3, 1.0), noise)
+tracked = tracker("ekf")(FilterInput(joint, np.sin(t), np.cos(t), -np.sin(t), np.sin(t), 1e-3, 1.0), noise)
 assert np.isfinite(tracked.tau_ext).all() and np.abs(tracked.tau_ext).max() > 0.1
 """
 
