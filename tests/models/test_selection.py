@@ -28,9 +28,11 @@ from davinci_forces.maths.selection import (
     standard_error,
     sum_equations,
 )
+from davinci_forces.records import Choice, Diagnostic
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import independent
+from davinci_forces.stages.model import choose
 
 RNG = np.random.default_rng(3)
 N, P, CELLS = 600, 4, 6
@@ -227,3 +229,38 @@ def test_a_refit_that_does_not_excite_a_base_parameter_has_no_score():
         refits = RefitModel(part, 1)
         assert refits.excites_all(cells, np.array([False, True])) == enough
         assert refits.excites_all(cells, np.array([True, False]))
+
+
+@pytest.mark.parametrize(
+    ("least_squares", "consistent", "mse", "used"),
+    [
+        ([-0.1], [0.1], 1.5, "consistent"),  # a motion that hardly excites the inertia
+        ([0.1], [0.2], 1.5, "ridge"),  # an inertia that is positive stays as it is
+        ([-0.1], [0.1], 9.0, "ridge"),  # as of a wrong sign: no mechanism has such an effort
+        ([-0.1], [0.0], 1.5, "ridge"),
+    ],
+)
+def test_parameters_of_a_mechanism_replace_those_without_a_positive_inertia(
+    monkeypatch, least_squares, consistent, mse, used
+):
+    monkeypatch.setattr(choose, "scores", lambda part, theta: {"mse": 1.0})
+    part = SimpleNamespace(model=SimpleNamespace(group="lift"), is_physical=lambda theta: theta[0] > 0.0)
+    other = SimpleNamespace(model=SimpleNamespace(group="pan"), is_physical=lambda theta: True)
+    chosen = SimpleNamespace(
+        parts=(part, other), parameters=lambda: [least_squares, [1.0]], estimator="ridge", name="searched", added="",
+        variant="chosen", size=1,
+    )  # fmt: skip
+    one = {name: np.ones(1) for name in ("score", "score_std", "training", "training_std")}
+    over = {name: np.ones(1) for name in ("over_periods", "over_periods_std")}
+    selection = SimpleNamespace(
+        candidates=(chosen,), chosen=chosen, best=chosen, physical=(False,), why="", scores=one | over
+    )
+    fitted = [
+        SimpleNamespace(group="lift", estimator="ridge", theta=least_squares, mse=1.0),
+        SimpleNamespace(group="lift", estimator="consistent", theta=consistent, mse=mse),
+    ]
+    made = list(choose.choice(selection, [], fitted))
+    assert [(r.group, r.estimator) for r in made if isinstance(r, Choice)] == [("lift", used), ("pan", "ridge")]
+    remarks = [text for r in made if isinstance(r, Diagnostic) for text in r.text]
+    assert len(remarks) == (used == "consistent")
+    assert all("lift: the inertia of chosen.ridge is not positive" in text for text in remarks)

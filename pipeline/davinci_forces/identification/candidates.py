@@ -76,6 +76,10 @@ class CandidatePart(NamedTuple):
         """Return the part with a ridge of another strength."""
         return self._replace(ridge=self.ridge._replace(strength=strength))
 
+    def is_physical(self, theta: Array) -> bool:
+        """Whether the inertia by parameters (p,) is positive definite along the trajectories."""
+        return bool(np.linalg.eigvalsh(self.library.inertias[..., self.columns] @ theta).min() > 0)
+
     @property
     def by_block(self) -> Equations:
         """The equations in cells of the path."""
@@ -143,8 +147,7 @@ class Candidate(NamedTuple):
     @property
     def is_physical(self) -> bool:
         """Whether the inertia is positive definite along the trajectories."""
-        pairs = zip(self.parts, self.parameters(), strict=True)
-        return all(np.linalg.eigvalsh(p.library.inertias[..., p.columns] @ theta).min() > 0 for p, theta in pairs)
+        return all(part.is_physical(theta) for part, theta in zip(self.parts, self.parameters(), strict=True))
 
 
 def candidates(

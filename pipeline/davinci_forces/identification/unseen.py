@@ -4,7 +4,7 @@ Own fits leave out the log or, with a single log, a period or a segment.  So do 
 candidate is chosen by another scheme, which leaves blocks of path out.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -157,22 +157,26 @@ class RefitModel:
         return self._thetas[key]
 
 
-def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed]) -> Iterator[Prediction | Diagnostic]:
+def predictions(
+    candidate: Candidate, logs: Sequence[Observed], used: Mapping[str, str] | None = None
+) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of each joint of all logs by refits of a candidate, by the scheme of the joints' own fits.
 
-    The chosen candidate is refitted without blocks of path, as `chosen`, and without whole logs if it has several, as
-    `chosen_by_log`.  Without a refit there is no prediction.
+    The chosen candidate has the estimator of the fit that is `used` of each group.  It is refitted, always by its own
+    estimator, without blocks of path, as `chosen`, and without whole logs if it has several, as `chosen_by_log`.
+    Without a refit there is no prediction.
     """
     name = f"{candidate.variant}.{candidate.estimator}"
     models = [RefitModel(part, len(logs)) for part in candidate.parts]
     for number in (log.number for log in logs):
         for model in (model for model in models if number in model.logs):
             log = model.logs[number]
-            if is_chosen:
+            if used:
+                chosen = f"{candidate.variant}.{used[model.model.group]}"
                 scheme = leave_blocks_out(model, log, "leave a block of path out")
-                yield from predict_scheme(scheme, model, log, CHOSEN, name)
+                yield from predict_scheme(scheme, model, log, CHOSEN, chosen)
                 if len(model.logs) > 1:
-                    yield from predict_scheme(scheme_of_own_fits(model, log), model, log, CHOSEN_BY_LOG, name)
+                    yield from predict_scheme(scheme_of_own_fits(model, log), model, log, CHOSEN_BY_LOG, chosen)
             elif name != "independent.lse":  # this candidate is the joint's own fit
                 scheme = scheme_of_own_fits(model, log)
                 yield from predict_scheme(scheme, model, log, candidate.variant, candidate.estimator)

@@ -14,6 +14,7 @@ from davinci_forces.identification.chosen import (
     better,
     fit_consistent,
     parameters,
+    scores,
     select_candidate,
 )
 from davinci_forces.identification.identifiability import excite_command, join_names
@@ -33,6 +34,7 @@ from davinci_forces.robots.robot import Robot
 
 MAPPED_ROLES = ("identification", "friction")
 MAPPED_ESTIMATORS = ("lse", "ridge")  # without constraints
+MAX_MSE_RATIO = 2.0  # of parameters that a mechanism can have to those without a positive inertia, which they replace
 
 
 def run(
@@ -64,7 +66,9 @@ def run(
     searches = search_joints(robot, separate, arm, reaches, lowpass)
     searched = select_candidate(searched_candidates(robot, searches, separate, arm, len(logs)), len(logs))
     selection = better(fixed, searched)
-    yield from choice(selection, logs)
+    fitted = list(fits(selection.chosen, fixed.candidates, len(logs), robot, with_consistent=True))
+    choices = list(choice(selection, logs, [record for record in fitted if isinstance(record, Fit)]))
+    yield from choices
     yield from (search_record(search, selection.chosen) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
@@ -76,10 +80,11 @@ def run(
     for name, candidate in named.items():
         if name != "independent.lse":
             yield from fits(candidate, fixed.candidates, len(logs), robot, by_variant[candidate.variant] == name)
-    yield from fits(selection.chosen, fixed.candidates, len(logs), robot, with_consistent=True)
+    yield from fitted
     for candidate in named.values():
-        yield from predictions(candidate, False, logs)
-    yield from predictions(selection.chosen, True, logs)
+        yield from predictions(candidate, logs)
+    used = {record.group: record.estimator for record in choices if isinstance(record, Choice)}
+    yield from predictions(selection.chosen, logs, used)
 
 
 def fits(
@@ -134,16 +139,27 @@ def never_together(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnosti
         yield diagnostic("choose", "together", "warning", f"{text}motion of the others is not identified; {remedy}")
 
 
-def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
-    """One Choice per group of the chosen model, with all candidates and their scores."""
+def choice(selection: Selection, logs: Sequence[Observed], fitted: Sequence[Fit]) -> Iterator[Choice | Diagnostic]:
+    """One Choice per group of the chosen model, with all candidates and their scores.
+
+    A motion that hardly excites the inertia may leave one that is not positive definite along the paths.  The parameters
+    that a mechanism can have then take their place, if they describe the effort nearly as well.
+    """
     chosen = selection.chosen
-    for part in chosen.parts:
+    for part, theta in zip(chosen.parts, chosen.parameters(), strict=True):
+        group, estimator = part.model.group, chosen.estimator
+        mse = {f.estimator: f.mse for f in fitted if f.group == group and part.is_physical(f.theta)}
+        if estimator not in mse and mse.get("consistent", np.inf) < MAX_MSE_RATIO * scores(part, theta)["mse"]:
+            estimator = "consistent"
+            text = f"{group}: the inertia of {CHOSEN}.{chosen.estimator} is not positive along the fitted paths"
+            follows = f"{CHOSEN}.consistent is used, with parameters that a mechanism can have"
+            yield diagnostic("choose", f"{group}.inertia", "note", f"{text}, so {follows}; a faster motion excites it")
         yield Choice.like(
             selection,
-            group=part.model.group,
+            group=group,
             model=CHOSEN,
             friction=chosen.added,
-            estimator=chosen.estimator,
+            estimator=estimator,
             chosen=chosen.name,
             best=selection.best.name,
             logs=tuple(log.records[0].log for log in logs),
