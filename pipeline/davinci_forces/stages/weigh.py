@@ -189,12 +189,13 @@ def gather(
         yield from torque_constants(weighing, carrying, tare, others, robot)
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
-            message = f"{weighing.log}: no moving joint carries the mass on {weighing.weight.moves_with}"
-            yield diagnostic(
-                "weigh", f"{weighing.log}.mass", "warning",
-                f"{message}, or none of them has a fit, or their efforts are currents; no mass is estimated: move a "
-                "joint that the mass loads, and state torque_constant where it is known",
-            )  # fmt: skip
+            message = f"no moving joint carries the mass on {weighing.weight.moves_with}, or none of them has a fit"
+            remedy = "move a joint that the mass loads"
+            if carrying:
+                message = "the efforts of the joints that carry the mass are currents"
+                remedy = "state their torque_constant, which a log of a known mass proposes"
+            text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
+            yield diagnostic("weigh", f"{weighing.log}.mass", "warning", text)
             continue
         if fault:
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"

@@ -142,7 +142,7 @@ def never_together(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnosti
 def choice(selection: Selection, logs: Sequence[Observed], fitted: Sequence[Fit]) -> Iterator[Choice | Diagnostic]:
     """One Choice per group of the chosen model, with all candidates and their scores.
 
-    A motion that hardly excites the inertia may leave one that is not positive definite along the paths.  The parameters
+    A motion that hardly excites the inertia may leave one that is not positive definite along the paths.  Parameters
     that a mechanism can have then take their place, if they describe the effort nearly as well.
     """
     chosen = selection.chosen
