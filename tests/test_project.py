@@ -129,7 +129,7 @@ def test_benchmarks_run_only_where_they_are_asked_for():
 def test_what_benchmarks_import_is_there(file):
     """Also in the code that they give to other processes; continuous integration runs no benchmark."""
     for module, brackets, bare in re.findall(
-        r"\bfrom (davinci_forces[\w.]*) import (?:\(([^)]*)\)|([\w, ]+))", file.read_text()
+        r"\bfrom ((?:davinci_forces|tests)[\w.]*) import (?:\(([^)]*)\)|([\w, ]+))", file.read_text()
     ):
         for name in re.findall(r"(\w+)(?: as \w+)?", brackets or bare):
             assert hasattr(import_module(module), name) or find_spec(f"{module}.{name}"), f"{module} has no {name}"
