@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -87,6 +88,11 @@ class TdmsLog(Log):
     origin: int = 0  # [s] since 1904; the zero of time stamps
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived time channels
 
+    @cached_property
+    def _paths(self) -> dict[str, str]:
+        """The path of each channel by its name, once for all clocks."""
+        return {name: path for path, name in self.names.items()}
+
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples; shorter channels are filled up with NaN."""
         yield from read_ahead(self._timed(names))
@@ -103,8 +109,7 @@ class TdmsLog(Log):
             row += count
 
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        path_of = {name: path for path, name in self.names.items()}
-        paths = [path_of[name] for name in dict.fromkeys(asked_for)]
+        paths = [self._paths[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.groups([path for path in paths if path not in self.scaled])
         groups = plain + self.index.groups([path for path in paths if path in self.scaled])
         with open_file(self.path) as file:
