@@ -177,7 +177,7 @@ def test_the_mass_is_read_wherever_the_name_states_it(tmp_path, name):
     t, q, dq = motion(1)
     new(table(tmp_path / f"{name}.csv", t, 0.2 * q, effort(q, dq), header="Time,Roll pos,Roll curr (A)"))
     assert 'role = "weight"' in (tmp_path / "study.toml").read_text()
-    assert "# weight = { mass = 0.15, " in (tmp_path / "study.toml").read_text()
+    assert "\nweight = { mass = 0.15 }  # CHECK: at the tip" in (tmp_path / "study.toml").read_text()
 
 
 def test_steps_back_and_gaps_do_not_change_the_rate_that_new_and_inspect_state(tmp_path):
@@ -273,7 +273,8 @@ def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
     assert roles == {
         "a": "identification", "b": "validation", "c_noweight": "validation", "d_205g": "weight", "e": "friction",
     }  # fmt: skip
-    assert "# weight = { mass = 0.205," in (tmp_path / "study.toml").read_text()
+    weight = next(entry for entry in reading.read(tmp_path).logs if entry.role == "weight")
+    assert (weight.weight.mass, weight.tare) == (0.205, "c_noweight")
 
 
 def test_where_nothing_repeats_all_logs_but_the_one_that_tests_are_identified_from(tmp_path):

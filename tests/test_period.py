@@ -9,7 +9,7 @@ from scipy.signal import lfilter, sosfiltfilt
 
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.periods import period
+from davinci_forces.maths.periods import harmonics, period
 from davinci_forces.maths.periods.agreement import differing_periods, stretch
 from davinci_forces.maths.periods.repetition import repetition, vertex
 from davinci_forces.maths.signals.faults import REACH, steps
@@ -69,6 +69,27 @@ def stepped(signal: Signal, at: float, by: float) -> Signal:
 
 def waves(t, T, amplitudes=(1.0, 0.5, 0.3)):
     return sum(a * np.sin(2 * np.pi * (k + 1) * t / T + k) for k, a in enumerate(amplitudes))
+
+
+@pytest.mark.parametrize("orders", [2, 5])
+def test_harmonics_that_the_motion_has_are_kept_unless_a_number_is_stated(orders):
+    t = np.arange(5000) / RATE
+    signal = moved(t)
+    q = 0.3 * waves(t, 10.0, (1.0, 0.5, 0.3, 0.0, 0.05)[:orders])
+    [mean], _ = run(replace(signal, q=q + 1e-4 * np.random.default_rng(1).normal(size=len(t))))
+    for stated, kept, warned in ((0, orders, 0), (2, 2, int(orders == 5))):
+        made = list(differentiate.run(mean, arm.joint("hand_roll"), harmonics=stated))
+        [trajectory] = [record for record in made if isinstance(record, Trajectory)]
+        assert trajectory.harmonics == kept
+        assert np.ptp(trajectory.q - mean.q) < (0.25 if warned else 2e-3)
+        assert len([record for record in made if isinstance(record, Diagnostic)]) == warned
+
+
+def test_noise_is_no_harmonic_however_large():
+    x = waves(np.arange(1000) / RATE, 10.0) + 0.3 * np.random.default_rng(2).normal(size=1000)
+    amplitude = harmonics.amplitudes(x)
+    assert amplitude[4:].max() > 0.03
+    assert harmonics.last_above(amplitude, 0.01) == 3
 
 
 STOPS = pytest.mark.parametrize("goes_on", [True, False], ids=["goes on", "has gone on"])

@@ -15,7 +15,7 @@ from davinci_forces.robots.from_toml import RESERVED
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.fingerprint import hash_of
 from davinci_forces.runner.reporting import study_files
-from davinci_forces.study import reading
+from davinci_forces.study import AttachedMass, reading
 from davinci_forces.toml import TomlFile, TomlTable
 from tests.arm import write_study
 from tests.test_runs import call
@@ -486,8 +486,9 @@ def test_a_weight_log_without_a_weight_is_named_with_what_to_write(tmp_path):
     made = read(tmp_path, GOOD.replace("identification", "weight"))
     [remark] = made.remarks
     assert remark.startswith(f"{tmp_path / 'study.toml'}:6: log 'a' has the role weight, but ")
-    assert "write weight = { mass = <kg, if known>, moves_with = " in remark
-    assert not read(tmp_path, GOOD.replace('"identification"', f'"weight"\n{HANGS}')).remarks
+    assert "write weight = { mass = <kg, if known> } for a mass at the tip, " in remark
+    for weight in ("weight = {}", "weight = { mass = 0.2 }", HANGS):
+        assert not read(tmp_path, GOOD.replace('"identification"', f'"weight"\n{weight}')).remarks
 
 
 HANGS = 'weight = { moves_with = "5", position = [0, 0.1, 0.2] }'
@@ -505,12 +506,16 @@ def test_a_mass_may_be_left_out_and_move_with_a_link_or_a_joint(tmp_path):
     said = HANGS.replace("moves_with", "mass = 0.2, moves_with").replace('"5"', '"hand_pitch"')
     [weighing] = hung(tmp_path, said).weighings.each
     assert (weighing.weight.mass, weighing.weight.moves_with, weighing.tare) == (0.2, "hand_pitch", "")
+    assert hung(tmp_path, "weight = { mass = 0.2 }").weighings.each[0].weight == AttachedMass("", None, 0.2)
 
 
 @pytest.mark.parametrize(
     ("written", "says"),
     [
         (HANGS.replace('"5"', '"elbow"'), "8: log 'a'.weight: moves_with must be one of hand_roll, hand_pitch, "),
+        ('weight = { moves_with = "5" }', "8: log 'a'.weight: position is missing"),
+        ("weight = { position = [0, 0, 0] }", "8: log 'a'.weight: moves_with is missing"),
+        ("weight = { masss = 1 }", "unknown key 'masss'; known keys are mass; did you mean 'mass'?"),
         (HANGS.replace("0.2]", "200]"), "8: log 'a'.weight: each coordinate of position must lie within 3 m, not "),
         (HANGS.replace("0.2]", "0.2], mass = -1"), "8: log 'a'.weight: mass must be finite and greater than 0, not -1"),
         (HANGS.replace("0.2]", "0.2], masss = 1"), "unknown key 'masss'; known keys are mass, moves_with, position"),

@@ -222,8 +222,8 @@ def test_words_of_folders_and_files_tell_the_role_whatever_the_channels_say(tmp_
     assert len({entry.name for entry in study.logs}) == len(FOLDERS)
     text = (tmp_path / "study.toml").read_text()
     assert 'role = "contact"  # "contact" in its name' in text
-    assert "# weight = { mass = 0.5, " in text
-    assert '# weight = { mass = "<kg, if known>", moves_with' in text
+    assert "\nweight = { mass = 0.5 }  # CHECK: at the tip; elsewhere also moves_with = " in text
+    assert "\nweight = {}  # mass = <kg, if known>; CHECK: at the tip; " in text
 
 
 def test_stillness_and_outliers_of_the_effort_tell_contact_whatever_the_channels_say(tmp_path):

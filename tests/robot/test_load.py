@@ -1,13 +1,17 @@
 """What an attached mass asks of the joints, against its potential energy and Newton's law along a motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.contact.weighing import mirror_position, moved_with, unit_load
-from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
+from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, tip
 from davinci_forces.robots import davinci, dvrk_psm
+from davinci_forces.stages.weigh import loads_per_kilogram
+from davinci_forces.study import AttachedMass
 
 CHAINS = {"davinci": davinci.ROBOT.chain, "dvrk_psm": dvrk_psm.ROBOT.chain}
 LINKS = [(name, link) for name, chain in CHAINS.items() for link in chain.links[:9]]
@@ -84,3 +88,13 @@ def test_the_other_side_of_a_link_is_as_high_and_as_far_out():
 def test_a_coordinate_that_moves_nothing_towards_the_tip_carries_nothing():
     with pytest.raises(ValueError, match="coordinate 9 does not move"):
         moved_with(CHAINS["dvrk_psm"], 9)
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_mass_without_a_place_hangs_at_the_tip(name):
+    robot, still = {"davinci": davinci.ROBOT, "dvrk_psm": dvrk_psm.ROBOT}[name], np.zeros((20, 3))
+    robot = replace(robot, joints=robot.joints[:3])
+    q = np.random.default_rng(2).uniform(-0.5, 0.5, (20, 3))
+    stated, _ = loads_per_kilogram(robot.chain, robot, AttachedMass("", None), (q, still, still))
+    slope = GRAVITY * slopes(lambda x: tip(robot.chain, x)[..., 2], q)
+    assert_allclose(stated, slope, atol=1e-8)

@@ -39,4 +39,6 @@ def run(
         remedy = "give its lines the position and the effort of each joint, uncomment them"
         echo(f"{target}: written, but no log can be used as it is: {remedy}, and run `davinci-forces all {folder}`")
     else:
+        if draft.remark:
+            echo(f"efforts are computed from currents: {draft.remark}")
         echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")

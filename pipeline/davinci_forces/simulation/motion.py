@@ -114,12 +114,6 @@ def _surroundings(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -
     return Surroundings(efforts, forces, log.mass, stiffness, damping, surface, UP.copy(), at_tip)
 
 
-def mass_position(scenario: Scenario) -> Array:
-    """The position of a mass on the tip at q = 0, from the remote centre (3,) [m], base axes."""
-    chain = scenario.robot.known_chain
-    return np.asarray(kinematics.tip(chain, np.zeros(len(scenario.robot.joints))) - kinematics.remote_centre(chain))
-
-
 def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     """The true parameters of each joint's model, which is exact while the other joints are at zero.
 

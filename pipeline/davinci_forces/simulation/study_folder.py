@@ -13,7 +13,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.signals.windows import spans
 from davinci_forces.simulation import sensors
-from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, mass_position, simulate_log, theta
+from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, simulate_log, theta
 from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
@@ -117,9 +117,7 @@ def study_entry(scenario: Scenario, log: SimulatedLog) -> str:
     if log.windows:
         lines.append(f"contact = {toml([list(window) for window in log.windows])}")
     if log.role == "weight":
-        place = [round(float(x), 4) for x in mass_position(scenario)]
-        joint = toml(scenario.robot.joints[-1].name)
-        lines.append(f"weight = {{ mass = {toml(log.mass)}, moves_with = {joint}, position = {toml(place)} }}")
+        lines.append(f"weight = {{ mass = {toml(log.mass)} }}")
     lines.append("[log.channels]")
     for channel in record_channels(scenario, log, at_rest):
         name = toml(sensors.channel_name(path, channel))

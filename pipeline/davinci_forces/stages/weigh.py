@@ -24,6 +24,7 @@ from davinci_forces.maths.contact.weighing import (
     residual,
     scaled_constant,
     shares,
+    tip_position,
     unit_load,
     widening_factor,
 )
@@ -155,12 +156,11 @@ def loads_per_kilogram(
 ) -> tuple[Array, Array]:
     """Joint effort of a kilogram (N, n) at the stated position, and at its mirror position on the link."""
     names = [joint.name for joint in robot.joints]
-    link = weight.moves_with  # names a link, or a joint with which a link moves
-    if link in names:
+    position = tip_position(chain, len(names)) if weight.position is None else np.array(weight.position)
+    link = weight.moves_with or chain.links[int(chain.body[chain.names.index(chain.tip)]) - 1]
+    if link in names:  # a joint, with which a link moves
         link = moved_with(chain, names.index(link))
-    stated, opposite = (
-        unit_load(chain, link, at, *motion) for at in (weight.position, mirror_position(weight.position))
-    )
+    stated, opposite = (unit_load(chain, link, at, *motion) for at in (position, mirror_position(position)))
     return stated, opposite
 
 
@@ -189,7 +189,8 @@ def gather(
         yield from torque_constants(weighing, carrying, tare, others, robot)
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
-            message = f"no moving joint carries the mass on {weighing.weight.moves_with}, or none of them has a fit"
+            link = weighing.weight.moves_with or "the tip"
+            message = f"no moving joint carries the mass on {link}, or none of them has a fit"
             remedy = "move a joint that the mass loads"
             if carrying:
                 message = "the efforts of the joints that carry the mass are currents"

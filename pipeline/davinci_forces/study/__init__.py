@@ -18,7 +18,7 @@ class Settings:
     """How a study is analysed.  Stages name the settings they use as keyword arguments."""
 
     lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
-    harmonics: int = 0  # of the excitation; 0 takes the robot's
+    harmonics: int = 0  # of the position, to keep; 0: the robot's, and more where the motion has more
     fit: str = "chosen"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0: the smallest that follows a push
     delay: float = PUSH_DELAY  # [s] by which the filter may show a push late, where q_tau is not stated
@@ -50,10 +50,13 @@ class Source:
 
 @dataclass(frozen=True)
 class AttachedMass:
-    """A mass attached to the arm, at a point fixed to a link.  Section 7.5"""
+    """A mass attached to the arm, at a point fixed to a link.  Section 7.5
 
-    moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
-    position: tuple[float, float, float]  # [m] from the remote centre, in the link's axes that at q = 0 are the base's
+    `position` is in metres from the remote centre, in axes of the link that are the base's at q = 0; None is the tip.
+    """
+
+    moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link; "" is the tip's
+    position: tuple[float, float, float] | None
     mass: float | None = None  # [kg] where it is known
 
 

@@ -177,6 +177,9 @@ def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
         return None
     weight = table.table("weight")
     mass = weight.number("mass", above=0.0, expected="a number of kg") if "mass" in weight else None
+    if not weight.values.keys() & {"moves_with", "position"}:
+        weight.close()
+        return AttachedMass("", None, mass)
     links = robot.chain.links if robot and robot.chain else ()
     moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
     position = weight.numbers("position", count=3, expected="[x, y, z] in metres")

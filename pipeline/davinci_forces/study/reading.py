@@ -163,8 +163,8 @@ def _weightless(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
         if log.role == "weight" and log.weight is None:
             yield (
                 f"{table.file.name}:{table.file.line(('log', i, 'role'))}: log {log.name!r} has the role weight, but "
-                "does not say where the mass hangs, so no mass is estimated; write weight = { mass = <kg, if known>, "
-                'moves_with = "<joint>", position = [x, y, z] }, in metres from the remote centre'
+                "no weight, so no mass is estimated; write weight = { mass = <kg, if known> } for a mass at the tip, "
+                'and with moves_with = "<joint>", position = [x, y, z] in metres from the remote centre for another'
             )
 
 

@@ -11,12 +11,14 @@ from davinci_forces.study.guessing import Holding
 
 # Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.
 WORDS = {
-    "free": r"(no|without) (weight|load|mass|contact|touch)|noweight|noload|nomass|nocontact|unloaded|free|in air",
+    "empty": r"(no|without|zero) ?(weight|pay ?load|load|mass)|(weight|payload|load|mass) (none|off|zero)"
+    r"|unloaded|empty|tare|0 ?k?g",
+    "free": r"(no|without) ?(contact|touch)|free|in air",
     "weight": r"weights?|payloads?|load|loaded|\d+ ?k?g",
     "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing",
     "contact": r"contacts?|touch\w*|push\w*|pok\w*|press\w*|collisions?|collid\w*|hits?",
     "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",
-    "validation": r"valid\w*|val|hold ?out|verif\w*",
+    "validation": r"valid\w*|val|hold ?out|verif\w*|(other|another|different) (path|motion|traj\w*)",
     "identification": r"ident\w*|sys ?id|calib\w*|train\w*",
     "excitation": r"excit\w*|exc",
     "test": r"test",
@@ -37,11 +39,12 @@ class Evidence:
 
 
 class Role(NamedTuple):
-    """A role, "" if it is not known, the reason for it, and the mass that the name states [kg]."""
+    """A role, "" if it is not known, the reason for it, and what a weight log has: its mass [kg], and its tare."""
 
     role: str
     reason: str
-    mass: float = 0.0
+    mass: float = 0.0  # as its name states
+    tare: int | None = None  # which of the logs
 
 
 def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
@@ -60,7 +63,7 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
         if chosen[i].role != "identification" and (reason := _unlike(recordings[i].holding, reference)):
             touched[i] = reason
     named = [role or (Role("contact", touched[i]) if i in touched else chosen[i]) for i, role in enumerate(roles)]
-    return _with_identification(recordings, named)
+    return _with_tares(recordings, _with_identification(recordings, named))
 
 
 def _word(path: str) -> tuple[str, str]:
@@ -69,10 +72,10 @@ def _word(path: str) -> tuple[str, str]:
         text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:[.p]\d+)?", part)).lower()
         kinds = [(kind, match[0]) for kind, words in WORDS.items() if (match := re.search(rf"\b({words})\b", text))]
         if kinds:
-            if kinds[0][0] == "weight" and (mass := MASS.search(text)):
+            if kinds[0][0] in ("weight", "empty") and (mass := MASS.search(text)) and float(mass[1].replace("p", ".")):
                 return "weight", mass[0]  # `weight150g`: the mass says more than the word
             clash = {kind for kind, _ in kinds} & {"identification", "contact", "tissue", "weight"}
-            if kinds[0][0] != "free" and "identification" in clash and len(clash) > 1:
+            if kinds[0][0] not in ("free", "empty") and "identification" in clash and len(clash) > 1:
                 return "clash", " and ".join(word for _, word in kinds)
             return kinds[0]
     return "", ""
@@ -86,8 +89,8 @@ def _by_word(recording: Evidence, kind: str, word: str) -> Role | None:
     if recording.touches_tissue and (kind in ("", "tissue", "contact", "test") or not recording.holding.meanings):
         return Role("tissue", "it has a depth and a force")
     match kind:
-        case "free" | "test":
-            return Role("validation", f"{reason}: free motion for validation" if kind == "free" else reason)
+        case "free" | "empty" | "test":
+            return Role("validation", reason if kind == "test" else f"{reason}: free motion for validation")
         case "weight":
             mass = MASS.search(word)
             kilograms = float(mass[1].replace("p", ".")) * (1.0 if mass[2] == "kg" else 1e-3) if mass else 0.0
@@ -194,4 +197,20 @@ def _with_identification(recordings: Sequence[Evidence], roles: list[Role]) -> l
     if free and not any(role.role == "identification" for role in roles):
         best = min(free, key=lambda i: _size(recordings[i].holding))
         roles[best] = Role("identification", f"{roles[best].reason}; but there is no other log to identify from")
+    return roles
+
+
+def _with_tares(recordings: Sequence[Evidence], roles: list[Role]) -> list[Role]:
+    """Give each weight log the free motion of the same joints that is named as without the mass, nearest in range."""
+    empty = [i for i, role in enumerate(roles) if role.role == "validation" and _word(recordings[i].path)[0] == "empty"]
+    for k, role in enumerate(roles):
+        spans = _spans(recordings[k].holding)
+        same = {i: _spans(recordings[i].holding) for i in empty if recordings[i].holding.moving}
+        apart = {
+            i: sum(abs(x - spans[j]) for j, x in other.items())
+            for i, other in same.items()
+            if other.keys() == spans.keys()
+        }
+        if role.role == "weight" and apart:
+            roles[k] = role._replace(tare=min(apart, key=lambda i: apart[i]))
     return roles

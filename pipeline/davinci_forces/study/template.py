@@ -42,11 +42,12 @@ class Row(NamedTuple):
 
 
 class Draft(NamedTuple):
-    """The text of a study.toml, its robot, whose file may have to be written, too, and a row for each log."""
+    """The text of a study.toml, its robot, whose file may have to be written, too, a row for each log, and a remark."""
 
     text: str
     arm: Arm
     rows: tuple[Row, ...]
+    remark: str
 
 
 @dataclass(frozen=True)
@@ -118,15 +119,20 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     drawn = _named_as(arm.robot, drawn)
     roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
     blocks, rows = [], []
-    for draft, role in zip(_distinct(drawn), roles, strict=True):
-        writer = _Writer(*draft, folder, arm.robot, role)
+    named = [*_distinct(drawn)]
+    for (draft, name), role in zip(named, roles, strict=True):
+        tare = "" if role.tare is None else named[role.tare][1]
+        writer = _Writer(draft, name, folder, arm.robot, role, tare)
         blocks += writer.lines()
         rows.append(writer.row())
     for file, why in refused.items():
         blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
         rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
-    return Draft(text, arm, tuple(rows))
+    assumed = [joint.name for joint in _joints_by_current(arm.robot, drawn) if not joint.effort]
+    drives = f"[robot_overrides] of study.toml, where those of {arm.name} are"
+    remark = f"check gear_ratio and torque_constant of {', '.join(assumed)} in {drives}" if assumed else ""
+    return Draft(text, arm, tuple(rows), remark)
 
 
 def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
@@ -195,14 +201,28 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
         yield f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"
     yield ""
     yield "[settings]  # every key has a default; the report lists the values used"
-    yield "# harmonics = 0  # commanded in a periodic excitation, to keep in the position; 0 takes the robot's number"
+    yield "# harmonics = 0  # to keep in the position of a periodic motion; 0 keeps those that it has"
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
-    if arm.name.endswith(".urdf"):
-        by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
-        for joint in (joint for k, joint in enumerate(robot.joints) if k in by_current):  # a URDF states no drives
+    for joint in _joints_by_current(robot, drawn):
+        if arm.name.endswith(".urdf"):  # a URDF states no drives
             yield from ("", f"[robot_overrides.{joint.name}]")
             yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
+        elif not joint.effort:
+            yield from (
+                "",
+                f"# [robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive",
+            )
+            yield from (
+                f"# gear_ratio = {joint.gear_ratio!r}",
+                f"# torque_constant = {joint.torque_constant!r}  # [N m/A]",
+            )
+
+
+def _joints_by_current(robot: Robot, drawn: Sequence[DraftLog]) -> list[Joint]:
+    """The joints whose effort is known by the current of their motor."""
+    by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
+    return [joint for k, joint in enumerate(robot.joints) if k in by_current]
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
@@ -226,6 +246,7 @@ class _Writer:
     folder: Path
     robot: Robot
     role: Role
+    tare: str
 
     @property
     def is_empty(self) -> bool:
@@ -284,7 +305,7 @@ class _Writer:
         yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
         yield from (f"joint of {name}" for name, symbol in self._without_joint().items() if symbol == "q")
         if self.role.role == "weight":
-            yield "weight = ... is missing: without it no mass is estimated"
+            yield "CHECK: the mass is taken to hang at the tip"
 
     def _role(self) -> Iterator[str]:
         others = ", ".join(role for role in ROLES if role != self.role.role)
@@ -293,9 +314,15 @@ class _Writer:
             return
         yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
         if self.role.role == "weight":
-            mass = f"{self.role.mass:g}" if self.role.mass else '"<kg, if known>"'
-            position = "position = [0.0, 0.0, 0.0] }  # [m] from the remote centre"
-            yield f'# weight = {{ mass = {mass}, moves_with = "<joint>", {position}'
+            mass = (
+                f"weight = {{ mass = {self.role.mass:g} }}  #"
+                if self.role.mass
+                else "weight = {}  # mass = <kg, if known>;"
+            )
+            elsewhere = 'moves_with = "<joint>", position = [x, y, z], in m from the remote centre'
+            yield f"{mass} CHECK: at the tip; elsewhere also {elsewhere}"
+            if self.tare:
+                yield f"tare = {_text(self.tare)}  # the run without the mass, to be subtracted"
 
     def _rate(self) -> Iterator[str]:
         timing, tissue = self.draft.guess.timing, bool(self.draft.touching)

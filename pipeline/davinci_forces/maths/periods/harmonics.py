@@ -13,6 +13,7 @@ from davinci_forces.maths.arrays import Array
 
 MAX_BASIS_SAMPLES = 1 << 15  # samples whose basis is in memory at a time
 EVEN = 256  # samples in a block of evenly spaced ones
+SIGNIFICANT = 5.0  # times the median amplitude of noise: white noise exceeds it once in 10^7 harmonics
 UNEVEN = 1e-7  # share of the time between samples: largest deviation of an even clock
 
 
@@ -172,6 +173,16 @@ def largest_omitted(amplitude: Array, harmonics: int) -> tuple[int, float]:
         return 0, 0.0
     order = harmonics + 1 + int(omitted.argmax())
     return order, float(amplitude[order]) / largest
+
+
+def last_above(amplitude: Array, share: float) -> int:
+    """The order of the last harmonic above a share of the largest, and above the noise of `amplitude`; 0 if none is.
+
+    The upper half of the spectrum is noise.
+    """
+    noise = SIGNIFICANT * float(np.median(amplitude[len(amplitude) // 2 :]))
+    orders = np.flatnonzero(amplitude[1:] > max(noise, share * float(amplitude[1:].max(initial=0.0)))) + 1
+    return int(orders[-1]) if len(orders) else 0
 
 
 def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:

@@ -145,7 +145,7 @@ def reason(entry: LogEntry, track: Track | None, is_fitted: bool) -> str:
     if entry.role == "friction":
         return "a friction log gives friction maps; its external effort is not tracked"
     if entry.role == "weight" and entry.weight is None:
-        return "its mass is not estimated; write weight = { moves_with = ..., position = ... } in study.toml"
+        return "its mass is not estimated; write weight = { mass = <kg, if known> } in study.toml"
     if track is None and is_fitted:
         return "its external effort is not estimated; the warnings of `davinci-forces all` say why"
     if track is None:

@@ -64,8 +64,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "the mean over periods, and the variance between them", "averaging"),
     )),
     (records.Trajectory, (
-        Prose("**Differentiation.** The averaged position is projected on the harmonics of the excitation, which "
-              "are differentiated exactly."),
+        Prose("**Differentiation.** The averaged position is projected on its harmonics, which are "
+              "differentiated exactly."),
         Equation("cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
                  "the spectrum of the n-th derivative is j omega to the n times that of the position",
                  "differentiation"),

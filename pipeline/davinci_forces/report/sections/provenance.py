@@ -29,8 +29,8 @@ def section(context: Context) -> Iterator[Block]:
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
     yield Prose(
-        "Settings used, defaults included. `harmonics` = 0 takes the robot's number, and `q_tau` = 0 the computed "
-        "random walk; `effort` has the efforts that the study seeks:"
+        "Settings used, defaults included. `harmonics` = 0 keeps those of the robot and of the motion, and `q_tau` = 0 "
+        "takes the computed random walk; `effort` has the efforts that the study seeks:"
     )
     settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
     yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))

@@ -47,9 +47,9 @@ def summary(context: Context, weights: list[Weight]) -> Table:
     for weight in weights:
         stated, side = str(Number(weight.stated_mass, "kg")), SIDES.get(weight.side, weight.side)
         numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
-        rows.append((literal(weight.log), literal(weight.moves_with), stated, *numbers, side))
+        rows.append((literal(weight.log), literal(weight.moves_with or "tip"), stated, *numbers, side))
     caption = (
-        "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
+        "Masses with their standard errors, at its position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
         "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
@@ -148,7 +148,7 @@ def by_joint(context: Context, weight: Weight) -> Table:
         f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
     )
     caption = (
-        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at the stated position and "
+        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at its position and "
         "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
         f"standard error of the mass includes it.{together if len(rows) > 1 else ''} Also the offset of the day, and "
         "the root mean squares of the residual with the mass and of the model's error in free motion."

@@ -12,11 +12,14 @@ MAX_OMITTED_HARMONIC = 0.01  # share of the largest harmonic; a larger omitted h
 
 
 def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajectory | Spectrum | Diagnostic]:
-    """Compute position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
-    orders = harmonics or joint.harmonics
+    """Compute position, velocity and acceleration from the harmonics of the excitation.  (6.34)
+
+    With `harmonics` 0 these are the joint's, and more where the motion itself has more.
+    """
+    amplitude = fourier.amplitudes(average.q)
+    orders = harmonics or max(joint.harmonics, fourier.last_above(amplitude, MAX_OMITTED_HARMONIC))
     q, dq, ddq = derivatives(average, orders)
     yield Trajectory.like(average, harmonics=orders, q=q, dq=dq, ddq=ddq)
-    amplitude = fourier.amplitudes(average.q)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
     largest, share = fourier.largest_omitted(amplitude, orders)
     if share > MAX_OMITTED_HARMONIC:
