@@ -11,7 +11,7 @@ from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import bias
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std, share_passed
-from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Residual, Signal
+from davinci_forces.records import Choice, Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Residual, Signal
 from davinci_forces.stages.model import choose, fit, predict
 from davinci_forces.stages.recordings import resample
 from davinci_forces.study.entries import ROLES
@@ -161,6 +161,21 @@ def test_where_a_log_lacks_joints_of_the_chosen_model_that_of_the_joint_by_itsel
     [note, model] = arm.models([identified[0]], fits, fit="coupled.lse", robot=davinci.ROBOT)
     assert "the log does not hold the other joints that coupled.lse needs, so independent.lse is used" in note.text[0]
     assert (model.model, note.text[0].endswith(model.stand_in)) == ("independent", True)
+
+
+@pytest.mark.parametrize(("physical", "used"), [(1, "independent+dahl"), (0, "independent")])
+def test_the_best_physical_model_of_a_joint_by_itself_stands_in(identified, physical, used):
+    from davinci_forces.robots import davinci
+    from tests.test_explain import fit as of_roll
+
+    fits = [of_roll("independent"), of_roll("coupled"), replace(of_roll("independent"), model="independent+dahl")]
+    variants = np.array(["coupled", "independent+dahl", "independent"], object)
+    columns = dict.fromkeys(Choice.columns(), np.zeros(3)) | {"candidate": variants, "variant": variants}
+    columns |= {"score": np.array([0.1, 0.2, 0.3]), "physical": np.array([1, physical, 1])}
+    about = dict.fromkeys(Choice.scalars(), "") | {"group": "hand_roll", "model": "coupled", "estimator": "lse"}
+    made = arm.models([identified[0]], [*fits, Choice(**about | columns)], fit="chosen", robot=davinci.ROBOT)
+    assert any(f"coupled.lse needs, so {used}.lse is used" in d.text[0] for d in made if isinstance(d, Diagnostic))
+    assert [m.model for m in made if isinstance(m, JointModel)] == [used]
 
 
 def test_the_stage_has_a_record_of_its_own_for_every_joint_that_a_fit_describes(identified):

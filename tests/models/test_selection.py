@@ -140,11 +140,17 @@ def test_blocks_are_sixths_of_the_period_or_of_the_recording():
 
 @pytest.mark.parametrize("logs", [1, 2, 7, 100])
 def test_every_scheme_leaves_every_cell_out_once_in_few_groups(logs):
-    schemes = schemes_of(np.ones((logs * PATH_BLOCKS, 1)), logs)
+    schemes = schemes_of(np.ones((logs * PATH_BLOCKS, 1)), [3] * logs)
     assert len(schemes) == (2 if logs == 1 else 3)
     for groups in schemes:
         assert_allclose(groups.sum(axis=0), 1)
     assert sum(map(len, schemes)) <= MAX_GROUPS
+
+
+@pytest.mark.parametrize(("together", "by_log"), [((3, 1, 1), False), ((3, 1, 3), True), ((1, 1, 1), True)])
+def test_the_only_log_that_moves_joints_together_is_not_left_out(together, by_log):
+    schemes = schemes_of(np.ones((3 * PATH_BLOCKS, 1)), together)
+    assert [len(groups) for groups in schemes] == [6, 2] + [3] * by_log
 
 
 def worth(error: float, spread: float = 0.0, seed: int = 0) -> CrossValidation:

@@ -48,6 +48,11 @@ class Library:
         """The combinations of inertial parameters that the model's first parameters are; empty for a single joint."""
         return self.model.base.combination if isinstance(self.model, CoupledArm) else np.empty((0, 0))
 
+    @property
+    def together(self) -> dict[int, int]:
+        """The number of joints that move together in each log, by the log's number."""
+        return {log.number: int(log.is_moving.sum()) for log in self.logs}
+
     def columns(self, model: Model) -> list[int]:
         """Return the indices of the parameters of a model with some of the terms."""
         numbers = {identity(parameter): i for i, parameter in enumerate(self.model.parameters)}

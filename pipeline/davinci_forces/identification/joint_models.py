@@ -74,19 +74,30 @@ class Identified:
         names = [f"{choice.model}.{choice.estimator}" for choice in self._choices if choice.group in (joint, ARM)]
         return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)
 
+    def stand_in(self, joint: str) -> Fit | None:
+        """Return the physical fit of a joint by itself that cross-validation ranks first, or `FALLBACK` without any."""
+        by_name = {f"{f.model}.{f.estimator}": f for f in self.fits_of(joint) if f.structure == "independent"}
+        ranked = sorted(
+            (score, str(variant))
+            for choice in self._choices if choice.group in (joint, ARM)
+            for score, variant, physical in zip(choice.score, choice.variant, choice.physical, strict=True) if physical
+        )  # fmt: skip
+        names = (f"{variant}.{estimator}" for _, variant in ranked for estimator in ("lse", "ridge"))
+        return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)
+
     def fit_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
         """Return the fit of a joint along a log with the joints `held`, and why it replaces the fit of the setting.
 
         Raises PipelineError if there is no fit of that name.
         """
-        fit, stand_in = self.fit_of(joint, setting), self.fit_of(joint, FALLBACK)
+        fit, stand_in = self.fit_of(joint, setting), self.stand_in(joint)
         if fit is None:
             names = ", ".join(f"{f.model}.{f.estimator}" for f in self.fits_of(joint))
             raise PipelineError(f"{joint}: there is no fit {setting!r}; set fit in [settings] to one of {names}")
         if stand_in is None or set(self.model(fit).joints) <= set(held):
             return fit, ""
         needs = f"the log does not hold the other joints that {fit.model}.{fit.estimator} needs"
-        return stand_in, f"{needs}, so {FALLBACK} is used; add their channels"
+        return stand_in, f"{needs}, so {stand_in.model}.{stand_in.estimator} is used; add their channels"
 
     def path(self, motion: Motion) -> str:
         """Return whether a recording follows a path fitted in other logs, as `SAME_PATH` or `ANOTHER_PATH`."""

@@ -110,7 +110,8 @@ class JointSearch:
         if key not in self._steps:
             equations, model = self.library(processing, among or terms), self.model(terms)
             columns = equations.columns(model)
-            self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, len(self.logs))
+            together = [equations.together[log.number] for log in self.logs]
+            self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, together)
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
             left_out, steps = LeftOut(cells, self._schemes, scored), []
             for strength in neighbours(RIDGE_GRID, near) if near else RIDGE_GRID:

@@ -179,18 +179,22 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
     return np.asarray((elapsed / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
 
 
-def schemes_of(squares: Array, count: int) -> list[Booleans]:
-    """Schemes (G, C) of the cells that each of G refits leaves out; a cell is a block of one of `count` logs.
+def schemes_of(squares: Array, together: Sequence[int]) -> list[Booleans]:
+    """Schemes (G, C) of the cells that each of G refits leaves out; a cell is a block of a log.
 
     The schemes leave out sixths of the path, its halves, and each of several logs: at most `MAX_GROUPS` groups in all.
-    Each refit needs data of every effort, of squares (C, m) in all cells.
+    Each refit needs data of every effort, of squares (C, m) in all cells.  It also needs a log that moves as many
+    joints together as any, of which `together` (L,) has the numbers: without one, coupling cannot be estimated.
     """
+    count = len(together)
     log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
     parts = min(MAX_GROUPS - PATH_BLOCKS - 2, count)
     sixths = block == np.arange(PATH_BLOCKS)[:, None]
     halves = block // (PATH_BLOCKS // 2) == np.arange(2)[:, None]
     by_log = log * parts // count == np.arange(parts)[:, None]
-    schemes = [sixths, halves, by_log] if count > 1 else [sixths, halves]
+    widest = np.repeat(together, PATH_BLOCKS) == max(together)
+    is_coupled = count > 1 and all(widest[~group].any() for group in by_log)
+    schemes = [sixths, halves, by_log] if is_coupled else [sixths, halves]
     return [groups for groups in schemes if all((squares[~group].sum(axis=0) > 0).all() for group in groups)]
 
 

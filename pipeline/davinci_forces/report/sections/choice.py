@@ -24,12 +24,12 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
         "links). A name after + is added friction: `smooth` (continuous at zero velocity), `stribeck` (larger near "
         "rest), or one to three `dahl` elements (elastic before sliding; the percentages are their presliding "
         "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
-        "is refitted without a sixth of the path, without half of it, and without each log if there are several. Its "
-        "score is the error on the data left out over the RMS effort, averaged over moving joints; effort and "
-        "prediction pass the same low-pass. With periods left out, the error measures how well a model describes the "
-        "path that it was fitted to: all periods follow this path, so extra parameters lower this error even if they "
-        "overfit. With blocks of path left out, on raw samples, the error measures what to expect on a new path. This "
-        "error is larger, and the model is chosen by it."
+        "is refitted without a sixth of the path, without half of it, and without each log if the others move as many "
+        "joints together. Its score is the error on the data left out over the RMS effort, averaged over moving "
+        "joints; effort and prediction pass the same low-pass. With periods left out, the error measures how well a "
+        "model describes the path that it was fitted to: all periods follow this path, so extra parameters lower this "
+        "error even if they overfit. With blocks of path left out, on raw samples, the error measures what to expect "
+        "on a new path. This error is larger, and the model is chosen by it."
     )
     yield Prose(
         "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "

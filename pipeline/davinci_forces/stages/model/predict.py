@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 
 from davinci_forces.identification.identifiability import are_negative
-from davinci_forces.identification.joint_models import FALLBACK, Identified, LogModels, at_samples, refits_of
+from davinci_forces.identification.joint_models import Identified, LogModels, at_samples, refits_of
 from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.maths.arrays import Array, Booleans
@@ -58,12 +58,11 @@ def predict_joint(
     name = f"{motion.log}/{motion.joint}"
     identified, on_clock = along.identified, along.joints_on_clock(motion.joint)
     independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
-    chosen = identified.fit_of(motion.joint, CHOSEN)
-    if chosen is not None and not set(identified.model(chosen).joints) <= on_clock:
-        missing = f"{name}: the log does not hold the other joints that the chosen model needs"
-        message = f"{missing}, so {FALLBACK} replaces it; add their channels"
-        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", message)
-        chosen = identified.fit_of(motion.joint, FALLBACK)
+    chosen = None
+    if identified.fit_of(motion.joint, CHOSEN) is not None:
+        chosen, missing = identified.fit_along(motion.joint, CHOSEN, on_clock)
+        if missing:
+            yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", f"{name}: {missing}")
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
