@@ -176,7 +176,7 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
     signal = arm.signal("hand_roll")
     object.__setattr__(signal, "q", signal.q + 0.05 * np.sin(2 * np.pi * 5 * signal.t / 10))
     [mean] = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0, lowpass=17.0) if isinstance(r, Average)]
-    made = list(differentiate.run(mean, arm.joint("hand_roll"), harmonics=0))
+    made = list(differentiate.run(mean, arm.joint("hand_roll"), harmonics=2))
     assert "harmonic 5 of the position is" in str(made[-1].text)
 
 

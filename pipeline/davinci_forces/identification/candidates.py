@@ -49,7 +49,7 @@ class Library:
         return self.model.base.combination if isinstance(self.model, CoupledArm) else np.empty((0, 0))
 
     @property
-    def together(self) -> dict[int, int]:
+    def joints_moving(self) -> dict[int, int]:
         """The number of joints that move together in each log, by the log's number."""
         return {log.number: int(log.is_moving.sum()) for log in self.logs}
 

@@ -143,7 +143,7 @@ def other_models(
     """
     parts = [(p, not c.added) for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
     same = [(p, is_plain) for p, is_plain in parts if p.model.efforts == part.model.efforts]
-    together = [part.library.together.get(log, 0) for log in range(logs)]
+    together = [part.library.joints_moving.get(log, 0) for log in range(logs)]
     schemes = schemes_of(part.library.cells.scored.squares, together)
     for model, is_plain in ((more, is_plain) for p, is_plain in same for more in with_offset(p)):
         with suppress(np.linalg.LinAlgError):

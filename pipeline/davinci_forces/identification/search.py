@@ -110,7 +110,7 @@ class JointSearch:
         if key not in self._steps:
             equations, model = self.library(processing, among or terms), self.model(terms)
             columns = equations.columns(model)
-            together = [equations.together[log.number] for log in self.logs]
+            together = [equations.joints_moving[log.number] for log in self.logs]
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, together)
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
             left_out, steps = LeftOut(cells, self._schemes, scored), []
