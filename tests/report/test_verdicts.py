@@ -166,6 +166,8 @@ def test_a_joint_at_rest_is_no_problem_and_does_not_decide_where_another_run_mov
         (0.058, 0.030, 0.097, "warn"),  # its interval contains the stated mass, and zero
         (0.095, 0.005, 0.097, "good"),
         (0.080, 0.005, 0.097, "warn"),
+        (0.0979, 0.0001, 0.097, "good"),  # no torque constant is known to a hundredth
+        (0.0981, 0.0001, 0.097, "warn"),
         (0.080, 0.005, float("nan"), "info"),
     ],
 )

@@ -13,6 +13,7 @@ from davinci_forces.report.content import Cell, Level
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
+SAME_MASS = 0.01  # share of a stated mass: torque constants are not known better
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
 # Share of a path's variance that no fitted path explains; the stage `predict` uses the same limit.
@@ -146,7 +147,7 @@ def mass_level(weight: Weight) -> tuple[Level, str]:
         return "warn", "joints"
     if math.isnan(weight.stated_mass):
         return "info", "unstated"
-    if abs(weight.mass - weight.stated_mass) > NORMAL_95 * weight.mass_std:
+    if abs(weight.mass - weight.stated_mass) > max(NORMAL_95 * weight.mass_std, SAME_MASS * weight.stated_mass):
         return "warn", "scale"
     return ("good", "right") if weight.mass_std <= PRECISE * weight.stated_mass else ("warn", "wide")
 
@@ -233,7 +234,8 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",
          f"at most {percent(ROUGH)}", "beyond, or no usable push"),
         ("Mass", "standard error over stated mass",
-         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval, from joints that agree",
+         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval or within {percent(SAME_MASS)}, from "
+         "joints that agree",
          "beyond, or the joints contradict each other", "–"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Estimates of a simulated study",

@@ -49,7 +49,7 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
         rows.append((literal(weight.log), literal(weight.moves_with or "tip"), stated, *numbers, side))
     caption = (
-        "Masses with their standard errors, at its position and mirrored to the other side of the link, in case "
+        "Masses with their standard errors, each at its position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
         "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
