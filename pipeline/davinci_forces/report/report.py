@@ -23,6 +23,10 @@ from davinci_forces.report.writers import render_all
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
+LEGEND = (
+    "new path: share of the run's motion that is unlike any fitted path; ceiling: largest R2 that noise allows; "
+    "coverage: of the 95 % band"
+)
 HEADER = ("joint", "verdict", "new path", "model error", "error/effort", "R2", "ceiling", "detection level", "coverage")
 
 
@@ -76,7 +80,7 @@ def answer(context: Context) -> str:
         return "\n".join([message, *tissue]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
-    lines = [*align([HEADER, *rows]), *(["look at these first:", *looks] if looks else []), *tissue]
+    lines = [*align([HEADER, *rows]), LEGEND, *(["look at these first:", *looks] if looks else []), *tissue]
     return "\n".join(lines) + "\n"
 
 

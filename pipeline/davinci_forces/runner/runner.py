@@ -201,7 +201,7 @@ class Runner:
         current, tasks = sum(step.current for step in steps), sum(step.tasks for step in steps)
         if current:
             self._unchanged.append(f"{stage}: {current} of {tasks} up to date")
-        if not tasks:
+        if not tasks and len(self._named) == 1:  # a study need not have data for all stages
             self._unchanged.append(f"{stage}: the study has no data for it")
 
     def _plan_part(self, part: Part) -> list[Task]:

@@ -129,7 +129,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
         rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
-    assumed = [joint.name for joint in _joints_by_current(arm.robot, drawn) if not joint.effort]
+    by_current = [] if arm.name.endswith(".urdf") else _joints_by_current(arm.robot, drawn)  # a URDF states no drives
+    assumed = [joint.name for joint in by_current if not joint.effort]
     drives = f"[robot_overrides] of study.toml, where those of {arm.name} are"
     remark = f"check gear_ratio and torque_constant of {', '.join(assumed)} in {drives}" if assumed else ""
     return Draft(text, arm, tuple(rows), remark)
@@ -205,7 +206,7 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
     for joint in _joints_by_current(robot, drawn):
-        if arm.name.endswith(".urdf"):  # a URDF states no drives
+        if arm.name.endswith(".urdf"):
             yield from ("", f"[robot_overrides.{joint.name}]")
             yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
         elif not joint.effort:
