@@ -248,7 +248,7 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
 @pytest.mark.slow
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
     edit(
-        package / "records" / "quantities" / "forces.py",
+        package / "records" / "quantities.csv",
         "measured effort minus the model's",
         "the effort that the model does not explain",
     )

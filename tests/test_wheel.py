@@ -68,7 +68,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     suffixes = {Path(name).suffix for name in held}
     assert suffixes == {
         ".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".bib", ".typed", ".json", ".c", ".h", ".md",
-        ".ipynb", ".in", ".cff",
+        ".ipynb", ".in", ".cff", ".csv",
     }  # fmt: skip
 
 
