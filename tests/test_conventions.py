@@ -260,6 +260,7 @@ OPENS = {  # a module that opens files otherwise than through `files`, and why i
     "commands/haptics.py": "the package's own scenario",
     "runner/processes/arithmetic.py": "what Linux says of the processor",
     "runner/lock.py": "its own lock, which may be no file, and what Linux says of processes",
+    "records/quantities.py": "the package's own table",
     "records/store.py": "a library in C, after `require_file`",
     "logs/arrow/table.py": "a library in C, after `open_log`",
     "logs/hdf5/datasets.py": "a library in C, after `open_log`",
