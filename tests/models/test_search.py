@@ -78,6 +78,13 @@ def test_friction_that_reverses_within_a_short_way_is_found_and_not_hidden_by_a_
     assert abs(chosen.processing.effort_lag) < 0.003
 
 
+@pytest.mark.parametrize("width", [0.01, 0.018, 0.055])
+def test_a_width_between_those_of_the_grid_is_found(width):
+    record = motion([(0.3, lambda q, dq: np.tanh(dq / width) - np.sign(dq))])
+    [term] = (term for term in found(record).chosen.terms if term.name == "smooth friction")
+    assert abs(np.log(term.width / width)) < np.log(1.3)
+
+
 def test_a_noisy_motion_gets_a_lower_cutoff():
     """The acceleration of a noisy motion passes less noise at a lower cutoff."""
     noisy, clean = (found(motion(noise=noise)).chosen.processing.cutoff for noise in (2e-3, 0.0))

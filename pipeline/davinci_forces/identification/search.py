@@ -1,12 +1,14 @@
 """The search for the model of each joint: its terms, the processing of its motion and effort, and its ridge.
 
-A step changes the processing, or adds the term that most reduces the error on parts of the path left out.  It has to
-reduce the error of at least two thirds of the blocks of path.  The search ends where there is no such term.  Of all
-steps, the first one is chosen that is not clearly worse than the best: by at most one standard error of the difference.
+A step changes the processing, adds the term that most reduces the error on parts of the path left out, or changes the
+term's scale.  It has to reduce the error of at least two thirds of the blocks of path.  The search ends where there is
+no such term.  Of all steps, the first one is chosen that is not clearly worse than the best: by at most one standard
+error of the difference.
 The errors of all steps are those of the scores, whatever a step's low-pass.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -39,6 +41,8 @@ RIDGE_GRID = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 DISPLACEMENT_GRID = (0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
 WIDTH_GRID = (0.03, 0.1, 0.3)  # of the root mean square velocity
 DECAY_VELOCITY_GRID = (0.1, 0.3, 0.6)  # likewise
+SCALES = ("displacement", "width", "decay_velocity")
+SCALE_FACTORS = (0.5, 0.7, 1.4, 2.0)  # of a term's scale, tried where the grids found it
 MAX_PRESLIDING = 2  # deflections of one joint
 MAX_TERMS = 8  # added to one joint
 MIN_BETTER_BLOCKS = 2 / 3  # share of the blocks of path that a step has to improve
@@ -138,6 +142,8 @@ class JointSearch:
         while step is not None:
             moved = self.improve_processing(steps[-1], start, is_first)
             steps += [moved] if moved.improves(steps[-1]) else []
+            scaled = self.improve_scale(steps[-1])
+            steps += [scaled] if scaled.improves(steps[-1]) else []
             is_first, step = False, self.add_term(steps[-1])
             steps += [step] if step else []
         best = min(steps, key=lambda step: step.score)
@@ -161,6 +167,19 @@ class JointSearch:
     def best_processing(self, step: Step, options: Sequence[Processing]) -> Step:
         """Return the step with the best of some processings."""
         steps = (self.step("low-pass and lag", option, step.terms, step.strength) for option in options)
+        return min((step, *(s for s in steps if s)), key=lambda s: s.score)
+
+    def improve_scale(self, step: Step) -> Step:
+        """Return the step with the best of some scales of the last term that has one, which the grids only bracket."""
+        place = next((i for i in reversed(range(len(step.terms))) if step.terms[i].scale), None)
+        if place is None:
+            return step
+        term = step.terms[place]
+        field = next(name for name in SCALES if getattr(term, name))
+        others = [replace(term, **{field: round_scale(term.scale * factor)}) for factor in SCALE_FACTORS]
+        options = [(*step.terms[:place], other, *step.terms[place + 1 :]) for other in others]
+        among = (*step.terms, *others)
+        steps = [self.step(f"scale of {term.name}", step.processing, x, step.strength, among) for x in options]
         return min((step, *(s for s in steps if s)), key=lambda s: s.score)
 
     def add_term(self, step: Step) -> Step | None:

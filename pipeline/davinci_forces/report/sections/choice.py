@@ -33,11 +33,12 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
     )
     yield Prose(
         "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
-        "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on four or more "
-        "of the six parts of the path. The model after the earliest step whose error is within one standard error of "
-        "the least is taken. Then joints share the links' parameters, unless that is clearly "
-        "worse; then each joint keeps its own (“joint by joint”). Of the candidates with fixed terms, the simplest "
-        "that is not clearly worse than the best is taken. The searched model replaces it if its error is lower."
+        "or the delay of the effort after the motion, adds one term, or changes the width or distance of one. It has "
+        "to reduce the error on four or more of the six parts of the path. The model after the earliest step whose "
+        "error is within one standard error of the least is taken. Then joints share the links' parameters, unless "
+        "that is clearly worse; then each joint keeps its own (“joint by joint”). Of the candidates with fixed terms, "
+        "the simplest that is not clearly worse than the best is taken. The searched model replaces it if its error is "
+        "lower."
     )
     why = choice.why.removeprefix(choice.chosen)  # the choice is named once
     it = "It" if why != choice.why else ""
