@@ -8,7 +8,6 @@ The errors of all steps are those of the scores, whatever a step's low-pass.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -41,7 +40,6 @@ RIDGE_GRID = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 DISPLACEMENT_GRID = (0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
 WIDTH_GRID = (0.03, 0.1, 0.3)  # of the root mean square velocity
 DECAY_VELOCITY_GRID = (0.1, 0.3, 0.6)  # likewise
-SCALES = ("displacement", "width", "decay_velocity")
 SCALE_FACTORS = (0.5, 0.7, 1.4, 2.0)  # of a term's scale, tried where the grids found it
 MAX_PRESLIDING = 2  # deflections of one joint
 MAX_TERMS = 8  # added to one joint
@@ -175,8 +173,7 @@ class JointSearch:
         if place is None:
             return step
         term = step.terms[place]
-        field = next(name for name in SCALES if getattr(term, name))
-        others = [replace(term, **{field: round_scale(term.scale * factor)}) for factor in SCALE_FACTORS]
+        others = [term.with_scale(round_scale(term.scale * factor)) for factor in SCALE_FACTORS]
         options = [(*step.terms[:place], other, *step.terms[place + 1 :]) for other in others]
         among = (*step.terms, *others)
         steps = [self.step(f"scale of {term.name}", step.processing, x, step.strength, among) for x in options]

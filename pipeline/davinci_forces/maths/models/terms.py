@@ -17,7 +17,7 @@ This is exact for constant velocity over a sample.  `bias` is for arrays of samp
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -98,6 +98,11 @@ class Term:
     def scale(self) -> float:
         """The displacement or velocity that z depends on, in the joint's units; 0 for a term without."""
         return self.displacement or self.width or self.decay_velocity
+
+    def with_scale(self, scale: float) -> "Term":
+        """Return the term with another scale."""
+        changed: dict[str, Any] = {x: scale for x in ("displacement", "width", "decay_velocity") if getattr(self, x)}
+        return replace(self, **changed)
 
     @property
     def coefficients(self) -> Coefficients:
