@@ -1,11 +1,13 @@
 """The usual recordings of an arm: each joint moves alone, and all move together in one log."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import smooth_sign
-from davinci_forces.records import Choice, ModelSearch, Motion
+from davinci_forces.records import Choice, Fit, ModelSearch, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled_arm
 from davinci_forces.stages.model import choose
@@ -58,3 +60,13 @@ def test_the_searched_model_of_coupled_joints_is_chosen(made):
     scores = dict(zip(choice.candidate, choice.score, strict=True))
     fixed = min(score for name, score in scores.items() if not name.startswith("searched"))
     assert scores[choice.chosen] < 0.7 * fixed
+
+
+def test_the_consistent_inertia_of_a_joint_by_itself_is_one_that_a_filter_can_divide_by():
+    [record] = (m for m in recorded(JOINTS[0], [0], 2) if m.joint == JOINTS[0])
+    backward = replace(record, tau=record.tau - 1.0 * record.ddq)
+    made = choose.run([backward], [], replace(ROBOT, chain=None, bodies=None), fit="chosen", lowpass=17.0)
+    fits = {f.estimator: f for f in made if isinstance(f, Fit) and f.model == "chosen"}
+    free, held = (dict(zip(f.parameter, f.theta, strict=True)) for f in (fits["ridge"], fits["consistent"]))
+    inertias = [sum(theta for name, theta in x.items() if name in ("inertia", "lifted mass")) for x in (free, held)]
+    assert inertias[0] < 0 < inertias[1] < 0.5

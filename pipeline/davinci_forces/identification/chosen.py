@@ -28,6 +28,7 @@ from davinci_forces.records.prediction import CHOSEN
 
 LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
 NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
+MIN_INERTIA_SHARE = 1e-3  # of a joint's effort over its paths
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,12 +186,20 @@ class ConsistentFit(NamedTuple):
 def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
     """Fit a candidate's parameters within those that a mechanism can have, to the equations of all logs.
 
-    The standard errors remain those of the candidate, as `consistent` keeps those of least squares.
+    The standard errors remain those of the candidate, as `consistent` keeps those of least squares.  A joint by itself
+    has at least the inertia that causes `MIN_INERTIA_SHARE` of its effort, because a filter divides by it.
 
     Raises NotIdentifiable if the conic program is not solved.
     """
     equations, samples = sum_all(part.by_block), part.library.cells.samples
-    fit = nearest(factor(equations, part.ridge), part.model.mechanism)
+    R, mechanism = factor(equations, part.ridge), part.model.mechanism
+    fit = nearest(R, mechanism)
+    if not part.is_coupled and not part.is_physical(fit.theta):
+        size = float(np.sqrt(R.y @ R.y + R.min_squares))
+        is_inertia = part.library.inertias[..., part.columns].any(axis=(0, 1, 2))
+        least = np.where(is_inertia, MIN_INERTIA_SHARE * size / R.scale, 0.0)
+        theta = least + nearest(R._replace(y=R.y - R.U @ (R.scale * least)), mechanism).theta
+        fit = fit._replace(theta=theta, excess=float(R.excess(theta)) / size**2)
     estimate = free._replace(theta=fit.theta, **scores(part, fit.theta))  # type: ignore[arg-type]
     rmse, rmse_free = (np.sqrt(equations.errors(theta)[0] / samples) for theta in (fit.theta, free.theta))
     return ConsistentFit(estimate, rmse, rmse_free, fit.excess)

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -45,7 +45,7 @@ class Dialect:
     framed: bool  # whether rows begin or end with a pipe
     marked: bool  # whether rows begin with the mark of a comment
     unread: dict[str, str]  # by channel of text, why it is read neither as numbers nor as times
-    remarks: tuple[str, ...]  # on changed names, units by the size of numbers, and unread columns
+    remarks: tuple[str, ...]  # on changed names and unread columns
 
     @property
     def has_trailing(self) -> bool:
@@ -88,10 +88,12 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     unitless = [i for i, kind in enumerate(kinds) if kind == "number" and not header.units[i]]
     counted = {i: unit for i in unitless if (unit := _counted_unit(columns[i]))}
     units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
-    described = zip(unique(header.names), units, kinds, header.aliases, strict=True)
+    aliases = [
+        of_joint or alias for of_joint, alias in zip(_of_joints(header.names, columns), header.aliases, strict=True)
+    ]
+    described = zip(unique(header.names), units, kinds, aliases, strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
-    counts = {i: f"holds {columns[i][-1]}, the date as a count: its unit is {unit}" for i, unit in counted.items()}
-    remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in (unread | counts).items()}
+    remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in unread.items()}
     return Dialect(
         delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
         header_lines=frozenset(line.strip() for line in lines[:first] if line.strip()),
@@ -100,6 +102,16 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
         unread={channels[i].name: remarks[i] for i in unread},
         remarks=(*renaming_remarks(header.names, [channel.name for channel in channels]), *remarks.values()),
     )  # fmt: skip
+
+
+def _of_joints(names: Sequence[str], columns: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Aliases with the joint that another column names, as `rostopic echo -p` does: name0 holds that of position0."""
+    matches = [re.fullmatch(r"(|.*[./])(name|position|velocity|effort)(\d+)", name) for name in names]
+    joints = {(m[1], m[3]): cells[0] for m, cells in zip(matches, columns, strict=True)
+              if m and m[2] == "name" and len({*cells}) == 1}  # fmt: skip
+    for m in matches:
+        joint = joints.get((m[1], m[3]), "") if m and m[2] != "name" else ""
+        yield f"{m[1]}{m[2]}[{joint}]" if m and joint else ""
 
 
 def _unfolded(lines: Sequence[str]) -> list[str]:
