@@ -123,13 +123,14 @@ def test_a_joint_at_rest_stays_commented_out_with_the_reason(tmp_path):
     assert '# "joint_3.q" = "column_3"  # the joint does not move' in (tmp_path / "study.toml").read_text()
 
 
-def test_the_comment_of_a_joint_at_rest_says_what_it_means_to_an_arm_with_a_chain(tmp_path):
+def test_an_arm_with_a_chain_keeps_a_joint_at_rest_so_that_the_whole_arm_is_fitted(tmp_path):
     t, q, dq = motion(6)
     q[:, 2:], dq[:, 2:] = 0.7, 0.0
     write(tmp_path)
     new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
-    note = "the joint does not move; without it, no model of the whole arm is fitted to this log"
-    assert f'# "elbow.q" = "column_3"  # {note}' in (tmp_path / "study.toml").read_text()
+    assert held(tmp_path)["elbow.q"] == "column_3"
+    note = "no unit: SI; does not move, but a model of the whole arm needs it"
+    assert f"{note}\n" in (tmp_path / "study.toml").read_text()
 
 
 @pytest.mark.parametrize(

@@ -375,9 +375,12 @@ def test_a_joint_whose_effort_is_a_current_weighs_nothing_and_the_others_do():
 
 def test_where_all_efforts_are_currents_nothing_is_weighed_and_the_remedy_is_said():
     logs = [log("heavy", "weight", 2, HUNG.position)]
-    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current(*JOINTS))
+    unknown = Weighing("heavy", replace(HUNG, mass=None), "")
+    weight, _, said = analysed(logs, unknown, in_current(*JOINTS))
     assert weight is None
     assert any("the mass are currents; no mass is estimated: state their torque_constant" in text for text in said)
+    _, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current(*JOINTS))
+    assert any("this known mass gives the torque_constant of hand_roll and hand_pitch" in text for text in said)
 
 
 def test_a_robot_without_geometry_weighs_nothing_and_says_why():

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.identification.identifiability import join_names
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
@@ -186,7 +187,8 @@ def gather(
         others = [load for load in usable if load.weight == weighing.log != load.log]
         of_tare = [load for load in others if load.log == weighing.tare]
         tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
-        yield from torque_constants(weighing, carrying, tare, others, robot)
+        constants = [*torque_constants(weighing, carrying, tare, others, robot)]
+        yield from constants
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
             link = weighing.weight.moves_with or "the tip"
@@ -194,7 +196,12 @@ def gather(
             remedy = "move a joint that the mass loads"
             if carrying:
                 message = "the efforts of the joints that carry the mass are currents"
-                remedy = "state their torque_constant, which a log of a known mass proposes"
+                remedy = "state their torque_constant, which a log of a known mass gives"
+                if given := [record.joint for record in constants if isinstance(record, TorqueConstant)]:
+                    remedy = (
+                        f"this known mass gives the torque_constant of {join_names(given)}, to be written for each "
+                    )
+                    remedy += 'in place of effort = "A" in study.toml'
             text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", text)
             continue

@@ -21,7 +21,7 @@ WORDS = {
     "validation": r"valid\w*|val|hold ?out|verif\w*|(other|another|different) (path|motion|traj\w*)",
     "identification": r"ident\w*|sys ?id|calib\w*|train\w*",
     "excitation": r"excit\w*|exc",
-    "test": r"test",
+    "test": r"test|check",
 }
 MASS = re.compile(r"(\d+(?:[.p]\d+)?) ?(k?g)\b")
 WIDER = 1.2  # times the range of the logs before: a motion that reaches farther identifies, too

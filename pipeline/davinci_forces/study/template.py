@@ -408,9 +408,11 @@ class _Writer:
             note = f"MISSING: the unit is deg{rate} or rad{rate}; the angle exceeds a turn if it is in rad"
         line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
-            effect = "; without it, no model of the whole arm is fitted to this log" if self.robot.chain else ""
-            at_rest = meaning.joint in holding.joints_of_ranges()
-            return f"# {line}  # {'the joint does not move' if at_rest else 'CHECK: no position of the joint'}{effect}"
+            if meaning.joint not in holding.joints_of_ranges():
+                return f"# {line}  # CHECK: no position of the joint"
+            if self.robot.chain is None:
+                return f"# {line}  # the joint does not move"
+            note = f"{note}; does not move, but a model of the whole arm needs it"
         return f"{line}  # {meaning.reason}; {note}"
 
 
