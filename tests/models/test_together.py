@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from davinci_forces.identification.candidates import Candidate
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import smooth_sign
-from davinci_forces.records import Choice, Fit, ModelSearch, Motion
+from davinci_forces.records import Choice, Diagnostic, Fit, ModelSearch, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled_arm
 from davinci_forces.stages.model import choose
@@ -70,3 +71,14 @@ def test_the_consistent_inertia_of_a_joint_by_itself_is_one_that_a_filter_can_di
     free, held = (dict(zip(f.parameter, f.theta, strict=True)) for f in (fits["ridge"], fits["consistent"]))
     inertias = [sum(theta for name, theta in x.items() if name in ("inertia", "lifted mass")) for x in (free, held)]
     assert inertias[0] < 0 < inertias[1] < 0.5
+
+
+@pytest.mark.parametrize(("added", "estimator"), [(0.31, "consistent"), (-0.2, "ridge")])
+def test_where_no_inertia_is_positive_it_is_warned_of_unless_another_is_used(added, estimator, monkeypatch):
+    monkeypatch.setattr(Candidate, "is_physical", property(lambda self: False))
+    [record] = (m for m in recorded(JOINTS[0], [0], 2) if m.joint == JOINTS[0])
+    other = replace(record, tau=record.tau + added * record.ddq)
+    made = list(choose.run([other], [], replace(ROBOT, chain=None, bodies=None), fit="chosen", lowpass=17.0))
+    assert [r.estimator for r in made if isinstance(r, Choice)] == [estimator]
+    warned = any("no candidate has a positive" in text for r in made if isinstance(r, Diagnostic) for text in r.text)
+    assert warned == (estimator == "ridge")

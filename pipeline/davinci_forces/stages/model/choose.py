@@ -70,7 +70,8 @@ def run(
     choices = list(choice(selection, logs, [record for record in fitted if isinstance(record, Fit)]))
     yield from choices
     yield from (search_record(search, selection.chosen) for search in searches)
-    if not any(selection.physical):
+    used = {record.group: record.estimator for record in choices if isinstance(record, Choice)}
+    if not any(selection.physical) and {*used.values()} != {"consistent"}:
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
         where = "the report may name the cause beside all fits of each joint"
         yield diagnostic("choose", "arm", "warning", f"{message}; {where}")
@@ -83,7 +84,6 @@ def run(
     yield from fitted
     for candidate in named.values():
         yield from predictions(candidate, logs)
-    used = {record.group: record.estimator for record in choices if isinstance(record, Choice)}
     yield from predictions(selection.chosen, logs, used)
 
 
