@@ -219,6 +219,13 @@ def test_a_tip_that_no_pose_determines_is_refused_with_a_remedy():
     assert not list(resolve.apply(tracks("davinci", noise(3)), [], [], entry(role="validation"), robot))
 
 
+def test_efforts_in_ampere_are_no_forces_so_the_tip_has_none():
+    robot = load("davinci", Path())
+    robot = replace(robot, joints=tuple(replace(j, effort="A" * (j.name == "hand_pitch")) for j in robot.joints))
+    [said] = resolve.apply(tracks("davinci", efforts("davinci", PUSH)), [], [], entry(role="contact"), robot)
+    assert "the effort of hand_pitch is a current, not a force; state torque_constant" in said.text[0]
+
+
 def test_samples_near_a_singular_pose_are_marked_and_not_judged():
     centre = float(tip_force.singular_slides(load("davinci", Path()).chain, 0.0)[0])
     q = path("davinci", centre + 0.03)

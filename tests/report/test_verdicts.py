@@ -7,7 +7,7 @@ import pytest
 from report_records import free_space, prediction, stiffness, weight
 
 from davinci_forces.maths.periods.shift import SAME_PATH
-from davinci_forces.records import PathShare
+from davinci_forces.records import PathShare, TorqueConstant
 from davinci_forces.report import verdicts
 from davinci_forces.report.context import name_in_sentence
 from davinci_forces.report.sections.summary.opening import verdict_sentence
@@ -172,10 +172,18 @@ def test_a_joint_at_rest_is_no_problem_and_does_not_decide_where_another_run_mov
     ],
 )
 def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, level):
-    assert mass_level(weight(mass=mass, mass_std=std, stated_mass=stated))[0] == level
+    assert mass_level(weight(mass=mass, mass_std=std, stated_mass=stated), [])[0] == level
     exact = {"mass": 0.097, "mass_std": 0.001, "stated_mass": 0.097}
-    assert mass_level(weight(**exact, side="the other one")) == ("warn", "side")
-    assert mass_level(weight(**exact, differing="roll")) == ("warn", "joints")
+    assert mass_level(weight(**exact, side="the other one"), []) == ("warn", "side")
+    assert mass_level(weight(**exact, differing="roll"), []) == ("warn", "joints")
+
+
+@pytest.mark.parametrize(
+    ("used", "log", "why"), [(12.6, "run", "taken"), (12.63, "run", "right"), (12.6, "b", "right")]
+)
+def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, log, why):
+    constant = TorqueConstant(log, "lift", 0.5, used, 12.643, 0.17)
+    assert mass_level(weight(mass=0.5, mass_std=0.004, stated_mass=0.5), [constant])[1] == why
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

@@ -75,10 +75,10 @@ def slid(seed=0, std=0.5, model=0.1, lag=0.1, way=1.0, rest=6.0, band_from="free
     return Track(**columns, **scalars | named)
 
 
-def palpated(touches=(), tracks=(), **changes):
+def palpated(touches=(), tracks=(), robot=arm.ARM, **changes):
     """What the stage makes: the tissue, the pushes, the models and the remarks; None and () where there are none."""
     about = entry(role="tissue", **changes)
-    made = list(palpate.run(list(touches), list(tracks), about, arm.ARM, lowpass=17.0))
+    made = list(palpate.run(list(touches), list(tracks), about, robot, lowpass=17.0))
     tissue = next((r for r in made if isinstance(r, Stiffness)), None)
     models = next((r for r in made if isinstance(r, TissueModel)), None)
     said = [text for r in made if isinstance(r, Diagnostic) for text in r.text]

@@ -27,6 +27,7 @@ from davinci_forces.maths.tissue.tissue import (
 )
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.study import WHOLE_LOG
+from tests.arm import ARM
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
 SEEDS = 100
@@ -207,6 +208,13 @@ def test_the_slide_tells_by_its_effort_at_the_depth_it_belongs_to_and_not_at_res
     np.testing.assert_allclose(tissue.k_t_loading, tissue.k_t_unloading, rtol=0.03)
     at_rest = (pushes[0].t > 12.2) & (pushes[0].t < 13.8)
     assert not pushes[0].inside[at_rest].any()
+
+
+def test_a_slide_whose_effort_is_a_current_tells_no_stiffness():
+    robot = replace(ARM, joints=tuple(replace(joint, effort="A") for joint in ARM.joints))
+    tissue, *_, said = palpated(tracks=[slid()], robot=robot)
+    assert tissue is None
+    assert "an identification log of the prismatic joint, and its torque_constant" in said[0]
 
 
 def test_the_interval_of_the_slide_carries_the_error_of_its_model():

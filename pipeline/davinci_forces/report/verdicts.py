@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.special import bdtr
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import FreeSpace, LogSummary, PathShare, Prediction, Stiffness, Weight
+from davinci_forces.records import FreeSpace, LogSummary, PathShare, Prediction, Stiffness, TorqueConstant, Weight
 from davinci_forces.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
@@ -139,17 +139,28 @@ def is_minority(tissue: Stiffness) -> bool:
     return tissue.pushes < MIN_COUNTED * len(tissue)
 
 
-def mass_level(weight: Weight) -> tuple[Level, str]:
-    """Grade a mass, and say why; good needs the side, agreeing joints, and a narrow interval with the stated mass."""
+def mass_level(weight: Weight, constants: Sequence[TorqueConstant]) -> tuple[Level, str]:
+    """Grade a mass, and say why; good needs the side, agreeing joints, and a narrow interval with the stated mass.
+
+    A mass does not test torque constants that its own log gave: `constants` are those of all logs.
+    """
     if weight.side == "the other one":
         return "warn", "side"
     if weight.differing:
         return "warn", "joints"
     if math.isnan(weight.stated_mass):
         return "info", "unstated"
+    if any(is_taken(constant) for constant in constants if constant.log == weight.log):
+        return "info", "taken"
     if abs(weight.mass - weight.stated_mass) > max(NORMAL_95 * weight.mass_std, SAME_MASS * weight.stated_mass):
         return "warn", "scale"
     return ("good", "right") if weight.mass_std <= PRECISE * weight.stated_mass else ("warn", "wide")
+
+
+def is_taken(constant: TorqueConstant) -> bool:
+    """Whether the torque constant in use is the one that the log gives, to three or more digits."""
+    given, used = constant.torque_constant, constant.torque_constant_used
+    return any(math.isclose(used, float(f"{given:.{digits}g}"), rel_tol=1e-9) for digits in (3, 4, 5, 6))
 
 
 def truth_level(errors: Sequence[float]) -> tuple[Level, str]:
@@ -203,8 +214,9 @@ def is_mostly_constant(p: Prediction) -> bool:
 
 
 def band(coverage: float) -> Level:
-    """Grade a 95 % band by the share of free-space samples that it covers; too wide is no problem."""
-    return "bad" if coverage < COVERED[0] else "info" if coverage > COVERED[1] else "good"
+    """Grade a 95 % band by the share of free-space samples that it covers, as printed; too wide is no problem."""
+    printed = round(coverage, 2)
+    return "bad" if printed < COVERED[0] else "info" if printed > COVERED[1] else "good"
 
 
 def band_in_words(coverage: float, coverage_std: float = 0.0) -> str:

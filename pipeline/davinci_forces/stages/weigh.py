@@ -198,10 +198,8 @@ def gather(
                 message = "the efforts of the joints that carry the mass are currents"
                 remedy = "state their torque_constant, which a log of a known mass gives"
                 if given := [record.joint for record in constants if isinstance(record, TorqueConstant)]:
-                    remedy = (
-                        f"this known mass gives the torque_constant of {join_names(given)}, to be written for each "
-                    )
-                    remedy += 'in place of effort = "A" in study.toml'
+                    remedy = f"this known mass gives the torque_constant of {join_names(given)}; write each in "
+                    remedy += '[robot_overrides.<joint>] of study.toml, in place of effort = "A"'
             text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", text)
             continue
@@ -225,7 +223,14 @@ def torque_constants(
         parts = [tare[i] if tare else load, *filter(None, map(unseen_part, same))]
         run, *free = (fit_mass(rows_of([part], {}, "load")) for part in parts)
         apparent = MassEstimate(run.mass, pooled_std(run, free))
-        if not load.is_current or not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
+        if not load.is_current:
+            continue
+        if not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
+            text = (
+                f"{load.log}/{load.joint}: its current shows the known mass too imprecisely for a torque constant, as "
+            )
+            remedy = "where its axis is vertical; take the constant from a data sheet, or pull with a known force"
+            yield diagnostic("weigh", f"{load.log}.{load.joint}.torque-constant", "note", text + remedy)
             continue
         assert weighing.weight.mass
         scaled = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)

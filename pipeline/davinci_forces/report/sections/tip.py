@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
-from davinci_forces.report.content.number import MINUS
+from davinci_forces.report.content.number import MINUS, Number
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import section_of, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
@@ -199,8 +199,8 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     )
     return Figure3D(
         f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered in the "
-        f"order of [@tip-contacts]; 1 N is drawn {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % "
-        "interval along the least certain direction.",
+        f"order of [@tip-contacts]; 1 N is drawn {Number(1e3 * per_newton, 'mm', digits=2)} long. The black line at "
+        "its end is the 95 % interval along the least certain direction.",
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,
         f"tip-space-{force.log}",

@@ -66,8 +66,9 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         rows.append((*run_cells(constant), str(stated), str(used), proposed))
     caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
-        "apply one, write it as `torque_constant` in study.toml. They assume the stated mass, its position and the "
-        "gear ratio. Joints whose current shows the mass too imprecisely are left out."
+        "apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml, where `effort` is "
+        "left out then. They assume the stated mass, its position and the gear ratio. Joints whose current shows "
+        "the mass too imprecisely are left out."
     )
     header = ("Log", "Joint", "Known mass", "Used", "Proposed")
     return Table(caption, header, tuple(rows), "torque-constants", "llrrr")
@@ -90,11 +91,12 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
     mass, scale = (context.number(f"weight.{weight.log}.{name}", 3) for name in ("mass", "scale"))
     stated = f"{Number(weight.stated_mass, 'kg')} is stated."
-    level, why = mass_level(weight)
+    level, why = mass_level(weight, context.catalogue.records(TorqueConstant))
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": ". The study states no mass, so the scale of the efforts is not known.",
+        "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor.",
         "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",
         "right": f", and {stated} The scale, {scale}, agrees with 1.",

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from davinci_forces.identification.identifiability import join_names
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.contact.detection import rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
@@ -95,6 +96,8 @@ def why_unknown(tracks: dict[str, Track], robot: Robot, chain: Chain) -> str:
     names = [joint.name for joint in robot.joints]
     if missing := "; ".join(missing_joints(names, tracks)):
         return missing
+    if currents := [joint.name for joint in robot.joints if joint.effort]:
+        return f"the effort of {join_names(currents)} is a current, not a force; state torque_constant"
     q = np.column_stack([tracks[name].q for name in names])
     if bool(evaluate_in_blocks(lambda block: is_singular(chain, block), q).all()):
         why = "no pose determines all its directions, as where the last frame lies on a joint's axis"

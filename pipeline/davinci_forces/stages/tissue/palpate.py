@@ -33,7 +33,7 @@ def run(
     data = palpation_data(touch, slide, lowpass)
     if data is None or len(data.t) < MIN_SAMPLES_PUSH:
         message = "no push can be found, because no force or no depth is known"
-        advice = "state their channels, or add an identification log of the prismatic joint"
+        advice = "state their channels, or add an identification log of the prismatic joint, and its torque_constant"
         yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {message}; {advice}")
         return
     whole, windows = entry.contact == WHOLE_LOG, () if entry.contact == WHOLE_LOG else entry.contact
@@ -65,8 +65,9 @@ def numbered_pushes(data: palpation.Probing) -> list[tuple[Column, Column]]:
 
 
 def prismatic_track(tracks: Sequence[Track], robot: Robot) -> Track | None:
-    """The prismatic joint that moves farthest."""
-    slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest and t.filter == FILTER]
+    """The prismatic joint that moves farthest, of those whose effort is a force and not a current."""
+    forces = {joint.name for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort}
+    slides = [track for track in tracks if track.joint in forces and not track.at_rest and track.filter == FILTER]
     return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)
 
 

@@ -22,6 +22,7 @@ COMES_FIRST = re.compile(r"check the units|its external effort is not estimated"
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
+SMALL = 2.0  # of the alarm level, below which a contact may be an error of the model
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -78,7 +79,9 @@ def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
-    which = "Of the contact logs that touch only this joint (else of all), that with the largest model error is shown."
+    which = (
+        "Of the contact logs, that with the largest model error is shown; of those that touch only this joint, if any."
+    )
     is_shaded = any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
     return f"External effort of each joint{shaded}. {which} {level}"
@@ -107,9 +110,11 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         return f"{text} No contact is measured: {why}."
     peaks = largest_peaks(context, contacts)
     if not stated:
-        is_free_known = all(context.study.log(contact.log).has_known_free_motion for contact in contacts)
-        doubt = "" if is_free_known else " Small ones may be errors of the model: see [@contacts]."
-        return f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**{doubt}"
+        doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
+        small = sum(int((np.abs(contact.peak) < SMALL * contact.alarm_level).sum()) for contact in doubted)
+        doubt = f" Of these, {small} below twice that level may be errors of the model: see [@contacts]."
+        text = f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
+        return f"{text}{doubt}" if small else text
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
     )
@@ -180,7 +185,7 @@ def named_peaks(track: Track, contact: Contact) -> Points:
     t, sizes, width = track.t[places], np.abs(contact.peak[rows]), WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     covered = [(sizes[np.abs(t - at) < width] > size).any() for at, size in zip(t, sizes, strict=True)]
     names = tuple("" if near else f"{p:+.3g}" for near, p in zip(covered, contact.peak[rows], strict=True))
-    return Points(t, track.tau_ext_smooth[places], "", "black", names=names)
+    return Points(t, contact.peak[rows], "", "black", names=names)
 
 
 def spoken(contact: Contact) -> str:
@@ -197,12 +202,12 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     caption = (
-        "Trust in the estimates. New path to Ceiling are of the joint's run with the largest model error; Detection "
-        "level and Coverage are of that with the highest level. New path: share of the run's motion that is unlike any "
-        "fitted path. Model error: RMS of measured minus modelled effort, both low-passed, without noise. "
-        "Error/effort: model error over the RMS of the measured effort; $R^2$ includes the noise. Ceiling: largest "
-        "$R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: share of free-space "
-        "samples in the 95 % band. ± is one standard error."
+        "Trust in the estimates. Each row is of the joint's worst logs: New path to Ceiling of that with the "
+        "largest model error, Detection level and Coverage of that with the highest level. New path: share of the "
+        "run's motion that is unlike any fitted path. Model error: RMS of measured minus modelled effort, both "
+        "low-passed, without noise. Error/effort: model error over the RMS of the measured effort; $R^2$ includes "
+        "the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
+        "lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))

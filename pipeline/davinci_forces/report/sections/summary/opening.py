@@ -5,7 +5,7 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.records import Stiffness, Weight
+from davinci_forces.records import Stiffness, TorqueConstant, Weight
 from davinci_forces.report.content import Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS
@@ -85,7 +85,9 @@ def masses(context: Context) -> Iterator[str]:
     for weight in context.catalogue.records(Weight):
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
-        yield f"{WORDS.get(mass_level(weight)[0], '')} **{literal(weight.log)}**: mass {mass}{stated}".strip()
+        level, why = mass_level(weight, context.catalogue.records(TorqueConstant))
+        stated += ", which gave a torque constant in use: no test of it" * (why == "taken")
+        yield f"{WORDS.get(level, '')} **{literal(weight.log)}**: mass {mass}{stated}".strip()
 
 
 def stiffnesses(context: Context) -> Iterator[str]:
