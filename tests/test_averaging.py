@@ -240,6 +240,18 @@ def test_leaving_a_group_out_is_averaging_the_others():
         assert_allclose(rest.var, kept.var(axis=0, ddof=1), atol=1e-9)
 
 
+@pytest.mark.parametrize("periods", [4, 5])
+def test_the_alternating_mean_is_as_large_as_the_noise_in_the_mean(periods):
+    """Of 2000 phases: the variance of a mean of so many samples, also where one of them has no opposite."""
+    noise = np.random.default_rng(periods).normal(size=(periods, 2000))
+    phased = averaging.Phases(np.arange(noise.size) * 0.01, 20.0, 2000)
+    folded = averaging.Folded(noise.mean(0), noise.var(0), np.full(2000, periods), (noise - noise.mean(0)).ravel())
+    made = averaging.alternating_mean(folded, phased)
+    signs = np.where(np.arange(periods) % 2, -1.0, 1.0)[:, None]
+    np.testing.assert_allclose(np.corrcoef(made, (signs * (noise - noise.mean(0))).sum(0))[0, 1], 1.0, rtol=1e-12)
+    assert np.var(made) == pytest.approx(1 / periods, rel=4 * np.sqrt(2 / 2000))
+
+
 def test_logs_of_other_roles_are_not_averaged():
     assert run([arm.signal()], role="validation") == ([], [])
 

@@ -1,6 +1,7 @@
 """Tests of white noise, the causes that make innovations fail them, and what is said of each."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -346,3 +347,13 @@ def test_samples_far_from_reversals_have_no_change_of_sign_near():
     assert_array_equal(np.flatnonzero(~jumping), np.arange(500 - 5, 500 + 25 + 1))
     assert not far[np.any((since > -0.04) & (since < 0.24), axis=1)].any()
     assert far[np.all((since < -0.15) | (since > 0.35), axis=1)].all()
+
+
+def test_runs_are_tested_that_last_six_transients_or_else_the_longest():
+    subject = Subject({NAME: SimpleNamespace(T_s=0.01)}, None, None, None)
+    free = np.zeros(3000, bool)
+    free[10:590], free[700:1310], free[1400:2300] = True, True, True  # 5.8 s, 6.1 s and 9.0 s
+    assert Passes(subject).runs(free) == [slice(700, 1310), slice(1400, 2300)]
+    free[700:] = False
+    assert Passes(subject).runs(free) == [slice(10, 590)]
+    assert Passes(subject).runs(np.zeros(10, bool)) == [slice(0, 0)]

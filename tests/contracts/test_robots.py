@@ -77,7 +77,9 @@ def test_the_model_of_a_joint_has_an_inertia_and_a_bias_that_make_up_its_effort(
     model, (q, dq, ddq) = independent(joint), motions(1)
     theta = np.random.default_rng(0).uniform(0.05, 5.0, len(model.parameters))
     motion = ArmMotion(q, dq, ddq, 0.01, np.zeros(len(q), int))
-    M = (model.inertia_columns(q) @ theta)[:, 0, 0]
+    columns = model.inertia_columns(q)
+    assert columns.shape == (len(q), 1, 1, len(theta))
+    M = (columns @ theta)[:, 0, 0]
     assert M.min() > 0
     # Efforts of up to 100 round at 1e-14.
     tau = (model.regressor(motion).Phi @ theta)[:, 0]

@@ -66,7 +66,7 @@ class BlockEstimate(NamedTuple):
 def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection | None:
     """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
     libraries = {id(part.library): part.library for c in candidates for part in c.parts}.values()
-    together = [max((library.joints_moving.get(log, 0) for library in libraries), default=0) for log in range(count)]
+    together = [max(library.joints_moving.get(log, 0) for library in libraries) for log in range(count)]
     schemes = schemes_of(np.concatenate([x.cells.by_block.squares for x in libraries], axis=1), together)
     pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes))] if schemes else []
     if not pairs:

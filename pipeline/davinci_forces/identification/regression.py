@@ -53,9 +53,8 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
 
 
 def join_regressions(parts: Sequence[Regression]) -> Regression:
-    """Return the least squares problem of several parts together; what is not known of one is not known of all."""
-    ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
-    starts = tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts)
+    """Return the least squares problem of several logs together; what is not known of one is not known of all."""
+    starts = tuple(np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist())
     columns = {name: [getattr(p, name) for p in parts] for name in (*ROWS, "Phi_cov")}
     joined: dict[str, Any] = {
         name: None if any(x is None for x in xs) else np.concatenate(xs) for name, xs in columns.items()

@@ -100,8 +100,8 @@ def band_spectra(spectra: Spectra) -> Bands:
 
 def candidates(frequency: Array, K: int) -> tuple[Array, Array]:
     """Spectra S (G, B) of all correlation times and shares of white noise, and the sums (G,) of their correlations."""
-    times = np.concatenate([[1e-3], np.geomspace(SHORTEST_TIME, max(LONGEST_TIME * K, 1.0), TIMES)])
-    rho, a = (x.ravel() for x in np.meshgrid(np.exp(-1.0 / times), WHITE, indexing="ij"))
+    times = np.geomspace(SHORTEST_TIME, max(LONGEST_TIME * K, 1.0), TIMES)
+    rho, a = (x.ravel() for x in np.meshgrid(np.append(0.0, np.exp(-1.0 / times)), WHITE, indexing="ij"))
     slow = (1 - rho**2)[:, None] / (1 + rho[:, None] ** 2 - 2 * rho[:, None] * np.cos(frequency))
     return (1 - a)[:, None] * slow + a[:, None], (1 - a) * 2 * rho / (1 - rho)
 
