@@ -46,7 +46,7 @@ def section(context: Context) -> Iterator[Block]:
         "two parts. The part from noise follows from the differences between periods. The part from the model is the "
         "change of the value if blocks of path are left out, if the friction is modelled otherwise, and without the "
         "ridge, which pulls values towards zero. $z$ is the value over its standard error, both parts together. If "
-        "$abs(z) < 2$, the parameter may be zero."
+        "$abs(z) < 2$, the parameter may be zero, or only its sum with others is determined."
     )
     joints = list(dict.fromkeys(fit.group for fit in fits))
     for joint in joints:
