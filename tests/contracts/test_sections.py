@@ -455,7 +455,7 @@ def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, ca
         replace(c, alarm_level=0.6 * np.sort(np.abs(c.peak))[0]) for c in found
     ]  # its smallest is below twice that
     small = sum(int((np.abs(c.peak) < 2 * c.alarm_level).sum()) for c in found)
-    doubt = f"** Of these, {small} below twice that level may be errors of the model: see [@contacts]."
+    doubt = f"** Of these, {small} peaks below twice that level may be due to the model: see [@contacts]."
     for about, doubted in ((known, False), (unknown, True)):
         assert (doubt in summary.opening_paragraph(about, found)) == doubted
         notes = [block.text for block in walk(written("contacts", about)) if isinstance(block, Prose)]
@@ -489,6 +489,9 @@ def test_the_value_of_a_peak_is_left_out_beside_a_larger_one(lab: Lab, catalogue
     values |= {"found": np.ones(3), "onset": onset, "release": onset + 0.01 * width, "peak": np.array([1.0, -2.0, 0.5])}
     shown = summary.named_peaks(track, replace(contact, **values))
     assert shown.names == ("", "-2", "+0.5")
+    np.testing.assert_array_equal(shown.y, [1.0, -2.0, 0.5])  # where the names say
+    apart = replace(contact, **values | {"alarm_level": 0.5})
+    assert [contacts_section.verdict(apart, row) for row in range(3)] == ["found", "found", "small"]
 
 
 def test_a_contact_log_decides_on_a_joint_where_its_windows_of_contact_or_free_of_it_are_stated(

@@ -4,10 +4,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.special import bdtr
 
+from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import FreeSpace, LogSummary, PathShare, Prediction, Stiffness, TorqueConstant, Weight
+from davinci_forces.records import (
+    Contact,
+    FreeSpace,
+    LogSummary,
+    PathShare,
+    Prediction,
+    Stiffness,
+    TorqueConstant,
+    Weight,
+)
 from davinci_forces.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
@@ -19,6 +30,7 @@ MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the medi
 # Share of a path's variance that no fitted path explains; the stage `predict` uses the same limit.
 MIN_NEW_PATH = 0.0975
 MIN_MOVING = 0.5  # share of a run in motion; at rest, friction takes any value, and the run says nothing of the model
+SMALL = 2.0  # of the alarm level: peaks of contacts below it may be errors of the model
 COVERED = (0.90, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit
 WITHIN = {1: 0.6827, 2: 0.95, 4: 0.99994}  # share of right errors below this number of standard errors
@@ -206,6 +218,11 @@ def grade(share: float, good: float, caution: float) -> Level:
     if math.isnan(share):
         return "warn"
     return "good" if share <= good else "warn" if share <= caution else "bad"
+
+
+def is_small(contact: Contact) -> Booleans:
+    """Whether the peak of each contact (C,) is so near the alarm level that it may be an error of the model."""
+    return np.asarray(np.abs(contact.peak) < SMALL * contact.alarm_level)
 
 
 def is_mostly_constant(p: Prediction) -> bool:

@@ -12,6 +12,7 @@ from davinci_forces.report.content import Block, Cell, Figure, Number, Panel, Pr
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
+from davinci_forces.report.verdicts import is_small
 from davinci_forces.study import LogEntry
 
 PRINTED = 20  # contacts of the PDF at most
@@ -40,7 +41,8 @@ def section(context: Context) -> Iterator[Block]:
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "Interval: 95 % confidence interval of the peak, not below that of the mean. Verdict: whether the peak "
             "exceeds the detection level; “peak only” if it does but stays below the alarm level; “found” for a "
-            "contact outside the windows that the study states."
+            "contact outside the windows that the study states, and “small” if its peak is below twice the alarm "
+            "level, so that it may be an error of the model."
         )
         header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
         every = tuple(row for contact in contacts for row in rows(context, contact))
@@ -93,7 +95,7 @@ def interval(peak: Number | str, mean: Number | str) -> str:
 def verdict(contact: Contact, i: int) -> str:
     """Whether a contact is detected, or was found outside the windows that the study states."""
     if not contact.stated[i]:
-        return "found"
+        return "small" if is_small(contact)[i] else "found"
     return ("detected" if contact.found[i] else "peak only") if contact.above[i] else "not detected"
 
 

@@ -22,7 +22,6 @@ COMES_FIRST = re.compile(r"check the units|its external effort is not estimated"
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
-SMALL = 2.0  # of the alarm level, below which a contact may be an error of the model
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -111,8 +110,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     peaks = largest_peaks(context, contacts)
     if not stated:
         doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
-        small = sum(int((np.abs(contact.peak) < SMALL * contact.alarm_level).sum()) for contact in doubted)
-        doubt = f" Of these, {small} below twice that level may be errors of the model: see [@contacts]."
+        small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
+        doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
         text = f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
         return f"{text}{doubt}" if small else text
     outside = (
