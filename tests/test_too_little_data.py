@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from davinci_forces.filters.response import Response
 from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, free_space
 from davinci_forces.records import Choice, Diagnostic, FilterNoise, Fit, JointModel, Signal
 from davinci_forces.stages.forces import benchmark
@@ -79,18 +80,28 @@ def test_three_periods_have_no_weights_and_are_fitted_otherwise():
     assert "lse" in {record.estimator for record in made if isinstance(record, Fit)}
 
 
-@pytest.mark.parametrize(("samples", "is_compared"), [(99, False), (100, True)])
-def test_filters_are_compared_from_a_hundred_samples_of_free_motion_on(samples, is_compared):
+def compared(samples: int | None = None) -> list:
+    """What the comparison of the filters makes of a log; `samples` of free motion, or all."""
     identified = list(fit.run([trajectory(arm.signal("hand_roll"))], [], arm.ARM, lowpass=17.0))
     fits = [record for record in identified if isinstance(record, Fit)]
     log = arm.signal("hand_roll", seed=1, periods=2, role="validation", log="check")
     model = next(record for record in arm.models([log], fits) if isinstance(record, JointModel))
-    free = np.flatnonzero(free_space(model.t, (), model.rate))
     left_out = np.full(len(model), UNSCORED_SAMPLE)
-    left_out[free[:samples]] = 0
+    left_out[np.flatnonzero(free_space(model.t, (), model.rate))[:samples]] = 0
     noise = FilterNoise(
         "hand_roll", ("run",), RATE, 1e-4, 1e-3, arm.NOISE["hand_roll"], 1.0, 0.1, 0.02, 0.1, np.ones(1), np.ones(1)
     )
     entry = LogEntry("check", ("check.csv",), "validation", ())
-    made = list(benchmark.run(replace(model, unscored=left_out), fits, noise, entry, arm.ARM, q_tau=0.0))
-    assert bool(made) == is_compared
+    return list(benchmark.run(replace(model, unscored=left_out), fits, noise, entry, arm.ARM, q_tau=0.0))
+
+
+@pytest.mark.parametrize(("samples", "is_compared"), [(99, False), (100, True)])
+def test_filters_are_compared_from_a_hundred_samples_of_free_motion_on(samples, is_compared):
+    assert bool(compared(samples)) == is_compared
+
+
+@pytest.mark.parametrize(("share", "warnings"), [(0.49, 1), (0.51, 0)])
+def test_a_filter_that_shows_less_than_half_of_a_push_is_warned_of_once(share, warnings, monkeypatch):
+    monkeypatch.setattr(benchmark, "response", lambda *_: Response(share, 0.1))
+    texts = [text for record in compared() if isinstance(record, Diagnostic) for text in record.text]
+    assert len([text for text in texts if f"the filter shows only {share:.0%} of a push" in text]) == warnings
