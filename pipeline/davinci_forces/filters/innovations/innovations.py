@@ -43,9 +43,7 @@ def innovations(recording: Recording, noise: NoiseModel) -> Innovations:
 
 
 def delays(velocities: Sequence[Array], innovations: Sequence[Array]) -> list[Array]:
-    """Estimate how late [s] each sample (N,) was taken: for each joint, from all other joints."""
-    if len(velocities) == 1:
-        return [np.zeros_like(velocities[0])]
+    """Estimate how late [s] each sample (N,) was taken: for each joint, from all others; 0 where there is none."""
     variances = [fit_variances(dq, i) for dq, i in zip(velocities, innovations, strict=True)]
     numerators = [dq * i / r2 for dq, i, (r2, _) in zip(velocities, innovations, variances, strict=True)]
     weights = [dq**2 / r2 for dq, (r2, _) in zip(velocities, variances, strict=True)]
