@@ -607,6 +607,16 @@ def test_a_joint_tested_on_its_own_path_comes_between_errors_of_a_third_and_of_a
         assert first in texts[0]
 
 
+def test_a_joint_without_a_log_for_validation_is_told_to_record_one(full: Context):
+    [whole] = trusts(full, hand_pitch=0.05)
+    refitted = {"role": "identification", "path": "another path"}
+    for scheme, is_told in (("leave a block of path out", True), ("leave a log out", False)):
+        tested = replace(whole, prediction=replace(whole.prediction, scheme=scheme, **refitted), about=None)
+        told = [text for _, text in summary.looks_at(full, [tested]) if "tested only on parts of fitted logs" in text]
+        assert bool(told) == is_told
+        assert all("Record a validation log on another path." in text for text in told)
+
+
 @pytest.mark.parametrize(("seconds", "hidden"), [(1.0, 0.1), (20.0, 0.25)])
 def test_what_a_filter_says_before_it_has_converged_is_not_what_an_effort_reaches(full: Context, seconds, hidden):
     """A quarter of a second, of a short log a tenth."""

@@ -72,10 +72,14 @@ class Trust:
         return self.prediction is not None and repeats_path(self.prediction, self.about)
 
     @property
+    def of_parts(self) -> bool:
+        """Whether parts of a fitted log decide, which refits left out."""
+        return self.prediction is not None and not is_out_of_log(self.prediction)
+
+    @property
     def new_path(self) -> str:
         """The share of the run's path that no fit had, as it is printed; a dash where parts of a fitted log decide."""
-        whole = self.prediction is not None and is_out_of_log(self.prediction)
-        return percent(self.about.path_new if whole and self.about is not None else math.nan)
+        return percent(self.about.path_new if self.about is not None and not self.of_parts else math.nan)
 
     @property
     def at_rest(self) -> bool:

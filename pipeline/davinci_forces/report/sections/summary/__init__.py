@@ -257,14 +257,19 @@ def omitted_share(spectrum: Spectrum) -> float:
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """Yield one caveat for all joints that were tested only on the path that was fitted."""
+    """Yield one caveat for all joints that were tested only on the path that was fitted, and one for parts of it."""
     same = [trusted for trusted in trusts if trusted.same_path]
-    if same:
-        logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in same if trusted.prediction is not None)
-        names, which = ", ".join(title(trusted.joint) for trusted in same), ", ".join(logs)
-        repeats = f"tested only on the path that was fitted ({which}), where the model's error repeats. "
+    parts = [trusted for trusted in trusts if trusted.of_parts and not trusted.same_path]
+    where_tested = (
+        (4.0, same, "the path that was fitted ({}), where the model's error repeats."),
+        (2.0, parts, "parts of fitted logs ({}) that refits left out; on another path the error may be larger."),
+    )
+    for weight, some, where in where_tested:
+        logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in some if trusted.prediction is not None)
+        names, tested = ", ".join(title(trusted.joint) for trusted in some), where.format(", ".join(logs))
         remedy = f"Record a validation log on another path.{see(context, Prediction, 'prediction')}"
-        yield 4.0, f"**{names}**: {repeats}{remedy}"
+        if some:
+            yield weight, f"**{names}**: tested only on {tested} {remedy}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
