@@ -112,7 +112,10 @@ def logs_in_words(context: Context) -> str:
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
     """State that no joint was identified, which is a problem only of a study that measured nothing else."""
-    text = "No log is for identification, so no model of a joint was identified and no effort was tracked."
+    text = (
+        "No log is for identification, so no model of a joint was identified and no effort was tracked. Record each "
+        "joint on a periodic path, and give that log the role identification."
+    )
     if context.study.logs and any(log.role == "identification" for log in context.study.logs):
         text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
     others = [*context.catalogue.records(Stiffness), *context.catalogue.records(Weight)]
