@@ -120,7 +120,8 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
     by = "estimated" if math.isnan(weight.stated_mass) else "stated"
     offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
-    name, subtracted = literal(weight.log), ", before the tare is subtracted" if weight.tare else ""
+    name = literal(weight.log)
+    subtracted = ", before the tare is subtracted and the model's error with it" if weight.tare else ""
     once = "over one averaged period" if loads[0].period else "over the run"
     panels = []
     for load in loads:
