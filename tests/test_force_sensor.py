@@ -14,8 +14,8 @@ from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, sto
 from davinci_forces.robots import load
 from davinci_forces.runner import runs
 from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario import ForceSensor
 from davinci_forces.simulation.scenario import reading as scenario
-from davinci_forces.simulation.scenario.scenario import ForceSensor
 from davinci_forces.stages.tip import sense
 from davinci_forces.study import Source
 from tests.conftest import TWO_FRICTIONS

@@ -9,6 +9,7 @@ from scipy.special import stdtrit
 
 from davinci_forces.identification import model_error
 from davinci_forces.identification.candidates import Candidate, CandidatePart, CellEquations, Library
+from davinci_forces.maths import selection
 from davinci_forces.maths.models import terms
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion
@@ -117,8 +118,8 @@ def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in
     there = SimpleNamespace(names=[mass], variance=np.array([variance]), by_block=None, ridge=None)
     monkeypatch.setattr(model_error, "identities", lambda part: part.names)
     monkeypatch.setattr(model_error, "unit_variance", lambda part: part.variance)
-    monkeypatch.setattr(model_error, "sum_all", lambda cells: cells)
-    monkeypatch.setattr(model_error, "solve", lambda cells, ridge: np.array([2.5]))
+    monkeypatch.setattr(selection, "sum_all", lambda cells: cells)
+    monkeypatch.setattr(selection, "solve", lambda cells, ridge: np.array([2.5]))
     changes = model_error.squared_changes(here, np.array([2.0, 7.0, 3.0]), np.full(3, 0.1), there)
     np.testing.assert_allclose(changes, [0.25 - explained, np.nan, 9.0])
 
@@ -165,7 +166,7 @@ def test_a_parameter_is_compared_with_the_best_plain_model_and_with_models_that_
     monkeypatch,
 ):
     monkeypatch.setattr(model_error, "identities", lambda part: part.names)
-    monkeypatch.setattr(model_error, "standard_error", lambda errors, best: 0.1)
+    monkeypatch.setattr(selection, "standard_error", lambda errors, best: 0.1)
     rows = (  # name, ridge, added friction, score
         ("plain", 0.0, "", 1.5), ("plain, offset", 0.0, "", 1.4), ("plain, more ridge", 0.2, "", 1.3),
         ("itself", 0.1, "dahl", 1.0), ("as well", 0.0, "smooth", 1.19), ("worse", 0.0, "stribeck", 1.21),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.filters import tracker
-from davinci_forces.filters.problem import NoiseModel, stationary_joint
+from davinci_forces.filters.problem import NoiseModel, joint_at_rest
 from davinci_forces.filters.response import rise, rounding_error, smallest_q_tau
 from davinci_forces.maths.contact.detection import events
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
@@ -40,7 +40,7 @@ def push(shape, duration):
 def smoothed(shape, duration, peak, seed):
     """The push (N,), the smoothed effort (N,), its deviation (N,), what is rounded off (N,), and the rise [s]."""
     chance, true = np.random.default_rng(seed), peak * push(shape, duration)
-    joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, true + 0.14 * chance.normal(size=len(T)), T_S, 1.0)
+    joint = joint_at_rest(np.full(len(T), INERTIA), VISCOUS, true + 0.14 * chance.normal(size=len(T)), T_S, 1.0)
     q, dq = (std * chance.normal(size=len(T)) for std in (NOISE.r_q, NOISE.r_dq))
     joint = joint._replace(q=q, dq=dq)
     made, spread = tracker("rts")(joint, NOISE), rise(tracker("rts"), joint, NOISE)
@@ -104,7 +104,7 @@ def test_a_flank_begins_within_its_error_whatever_the_smoother_s_step_is_like(fl
     noise = STARTS._replace(r_dq=r_dq)
     noise = noise._replace(q_tau=smallest_q_tau(tracker("ekf"), INERTIA, VISCOUS, T_S, noise))
     rising, falling = (rise_of(np.clip(x / flank, 0.0, 1.0)) for x in (T - START, START + 3.0 - T))
-    joint = stationary_joint(np.full(len(T), INERTIA), VISCOUS, rising * falling, T_S, 1.0)
+    joint = joint_at_rest(np.full(len(T), INERTIA), VISCOUS, rising * falling, T_S, 1.0)
     effort, spread = tracker("rts")(joint, noise).tau_ext, rise(tracker("rts"), joint, noise)
     [found] = events(T, effort, np.full(len(T), 1e-3), 0.05, spread)
     assert abs(found.onset - START) < 1.25 * found.onset_std

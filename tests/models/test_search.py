@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.identification import search
+from davinci_forces.identification import candidates, search
 from davinci_forces.identification.candidates import library, reach_of
 from davinci_forces.identification.observations import Processing, observe
 from davinci_forces.identification.search import CUTOFF_GRID, MIN_BETTER_BLOCKS, JointSearch, neighbours, sets_of_terms
@@ -215,7 +215,7 @@ def test_searched_joints_share_links_all_or_all_but_one_of_more_than_two(monkeyp
         search.SearchResult(name, kind, (), step, step) for name in names for kind in ("independent", "coupled")
     ]
     monkeypatch.setattr(search, "searched_part", lambda robot, result, *others: result.joint)
-    monkeypatch.setattr(search, "weights_of", lambda parts: np.arange(joints) + 1.0)
+    monkeypatch.setattr(candidates, "weights_of", lambda parts: np.arange(joints) + 1.0)
     monkeypatch.setattr(search, "shared_part", lambda robot, sharing, arm, count, weights: Shared(sharing, weights))
 
     class Shared(SimpleNamespace):

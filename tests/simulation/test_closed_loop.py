@@ -14,8 +14,8 @@ from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
 from davinci_forces.maths.simulation.surroundings import UP, Path, Surroundings
 from davinci_forces.simulation.motion import SimulatedRun, simulate_log, theta
+from davinci_forces.simulation.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.scenario.reading import load
-from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.study_folder import contact_times
 from tests.conftest import TWO_FRICTIONS
 

@@ -17,7 +17,7 @@ from davinci_forces.maths.excitation.fourier import (
     qr_factor,
     ranges,
 )
-from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, shrink_into_limits
+from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, shrink_to_limits
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import TERMS, bias, inertia, stiffness
 from davinci_forces.robots.davinci import ROBOT
@@ -167,7 +167,7 @@ def test_the_same_seed_designs_the_same_trajectory():
 @given(series_of)
 def test_a_shrunk_trajectory_keeps_every_limit(series):
     asked = ExcitationProblem((inertia,), ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0)), series.period, len(series.a))
-    for (low, high), (lowest, highest) in zip(asked.limits, ranges(shrink_into_limits(asked, series)), strict=True):
+    for (low, high), (lowest, highest) in zip(asked.limits, ranges(shrink_to_limits(asked, series)), strict=True):
         assert low <= lowest
         assert highest <= high
 

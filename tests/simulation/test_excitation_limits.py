@@ -17,8 +17,8 @@ from davinci_forces.maths.excitation.fourier import (
     ranges,
     shortest_run_in,
 )
-from davinci_forces.maths.excitation.joint import ExcitationProblem, scale_to_limits, shrink_into_limits
-from davinci_forces.maths.excitation.limits import Obstacles, shrink_into_arm_limits
+from davinci_forces.maths.excitation.joint import ExcitationProblem, scale_to_limits, shrink_to_limits
+from davinci_forces.maths.excitation.limits import Obstacles, shrink_to_arm_limits
 from davinci_forces.maths.mechanics.kinematics import frames
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 from tests.simulation.six_joints import write
@@ -104,7 +104,7 @@ def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random
         z = random.normal(size=(6, 11))
         x = [scale_to_limits(part[None], joint.limits, 10.0)[0] for part, joint in zip(z, problem.joints, strict=True)]
         feasible = [
-            shrink_into_limits(j, Fourier.from_coefficients(c, 10.0)) for j, c in zip(problem.joints, x, strict=True)
+            shrink_to_limits(j, Fourier.from_coefficients(c, 10.0)) for j, c in zip(problem.joints, x, strict=True)
         ]
         best = min(best, float(determinant(arm_observation(problem, feasible))))  # without efforts and workspace
     assert optima.min() <= best - 8
@@ -130,12 +130,12 @@ def test_a_motion_is_shrunk_until_efforts_and_obstacles_hold_at_every_instant(si
     problem = problem_of(six, obstacles=high)
     up = [0.0, -1.2, 0.4, -0.8, 0.5, 0.0]
     series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 1.0)], 10.0) for a0 in up]
-    within = shrink_into_arm_limits(problem.limits, series)
+    within = shrink_to_arm_limits(problem.limits, series)
     assert within is not None
     assert 0 < within[0].x[1] < 1
     assert_limits_hold(replace(six, joints=tuple(six.joints)), problem, within, high)
     below = [Fourier.from_coefficients(np.r_[a0, np.full(10, 1.0)], 10.0) for a0 in (0, 1.5, 0, 0, 0, 0)]
-    assert shrink_into_arm_limits(problem.limits, below) is None
+    assert shrink_to_arm_limits(problem.limits, below) is None
 
 
 def test_a_motion_is_shrunk_until_efforts_just_hold(six):
@@ -149,7 +149,7 @@ def test_a_motion_is_shrunk_until_efforts_just_hold(six):
     weak = replace(six, joints=tuple(joints))
     problem = problem_of(weak, obstacles=Obstacles())
     series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 0.2)], 10.0) for a0 in rest]
-    within = shrink_into_arm_limits(problem.limits, series)
+    within = shrink_to_arm_limits(problem.limits, series)
     assert within is not None
     assert_limits_hold(weak, problem, within, Obstacles())
     t = np.linspace(0.0, 10.0, 10_001)
@@ -203,4 +203,4 @@ def test_a_motion_within_its_limits_is_not_shrunk(six):
     series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 0.3)], 10.0) for a0 in (0.0, -1.2, 0.4, -0.8, 0.5, 0.0)]
     limits = problem_of(six, obstacles=up).limits
     assert limits.present
-    assert shrink_into_arm_limits(limits, series) == series
+    assert shrink_to_arm_limits(limits, series) == series

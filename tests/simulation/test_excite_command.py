@@ -258,7 +258,7 @@ def test_a_stated_workspace_limits_the_search(monkeypatch):
     def refuse(problem, *_):
         raise ValueError(f"around it is {problem.limits.obstacles}")
 
-    monkeypatch.setattr(request, "design_together", refuse)
+    monkeypatch.setattr(request.arm, "design_together", refuse)
     with pytest.raises(BadRequest, match=r"floor=-0\.2, boxes=\(\(0\.0, 1\.0, 2\.0, 3\.0, 4\.0, 5\.0\),\)"):
         call("davinci", "all", "--floor", "-0.2", "--box", "0,1,2,3,4,5")
     with pytest.raises(BadRequest, match=r"floor=-inf, boxes=\(\)"):

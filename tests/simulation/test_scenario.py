@@ -16,8 +16,8 @@ from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.surroundings import Path
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.simulation.motion import simulate_log
+from davinci_forces.simulation.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.scenario.reading import _scenario, load, shipped_scenarios
-from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.sensors import record_force
 from davinci_forces.toml import TomlFile, TomlTable
 from tests.conftest import TWO_FRICTIONS

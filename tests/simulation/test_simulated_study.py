@@ -17,8 +17,8 @@ from davinci_forces.maths.excitation.fourier import motion
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.records import Average, Fit, Signal, Trajectory
 from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario import SensorNoise
 from davinci_forces.simulation.scenario.reading import load
-from davinci_forces.simulation.scenario.scenario import SensorNoise
 from davinci_forces.simulation.sensors import drift, generator, quantise
 from davinci_forces.stages.model import fit
 from davinci_forces.stages.recordings import average, differentiate

@@ -64,7 +64,7 @@ def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
     return values
 
 
-def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
+def joint_at_rest(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))
     coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))

@@ -12,15 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, filter_parts, tracker
-from davinci_forces.filters.problem import (
-    Filter,
-    FilterInput,
-    LongInput,
-    NoiseModel,
-    Recording,
-    column,
-    stationary_joint,
-)
+from davinci_forces.filters.problem import Filter, FilterInput, LongInput, NoiseModel, Recording, column, joint_at_rest
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.contact.detection import STEP_WIDTH, TIP_REACH
@@ -61,7 +53,7 @@ def response(change: Array, t: Array, start: float, peak: float) -> Response:
 def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> Response:
     """Compute the response of a filter to a push on a joint at rest, where the filter is linear."""
     t = np.asarray(T_s * np.arange(round((BEFORE + DURATION + AFTER) / T_s) + 1), np.float64)
-    pushed = stationary_joint(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, initial_std=1.0)
+    pushed = joint_at_rest(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, initial_std=1.0)
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
 
 
@@ -75,7 +67,7 @@ def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
     step = np.where(t >= BEFORE, 1.0, 0.0)
-    stepped = stationary_joint(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
+    stepped = joint_at_rest(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
     shown = np.maximum.accumulate(track(stepped, noise).tau_ext)
     lower, upper = np.interp([0.25 * shown[-1], 0.75 * shown[-1]], shown, t)
     return float(2.0 * (upper - lower) / STEP_WIDTH)
@@ -105,7 +97,7 @@ def smallest_q_tau(
 def steady_std(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
     """Compute the standard deviation of the external effort on a joint at rest, once the filter has converged."""
     still = np.zeros(round(BEFORE / T_s) + 1)
-    at_rest = stationary_joint(np.full(len(still), inertia), viscous, still, T_s, initial_std=1.0)
+    at_rest = joint_at_rest(np.full(len(still), inertia), viscous, still, T_s, initial_std=1.0)
     return float(tracker(DEFAULT)(at_rest, noise).tau_ext_std[-1])
 
 
@@ -135,7 +127,7 @@ def lag_error(recordings: Sequence[Recording], smoothed: Array, noise: NoiseMode
     def at_rest(recording: Recording, tau_ext: Array, rows: slice) -> FilterInput:
         joint = recording.part(rows).joint
         viscous = joint.coefficients[VISCOUS]
-        return stationary_joint(joint.inertia, viscous, tau_ext[rows], recording.T_s, recording.initial_std)
+        return joint_at_rest(joint.inertia, viscous, tau_ext[rows], recording.T_s, recording.initial_std)
 
     inputs = [
         LongInput(recording.samples, recording.T_s, recording.initial_std, partial(at_rest, recording, tau_ext))

@@ -8,21 +8,11 @@ import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart
 from davinci_forces.identification.model_error import model_std, std_over_periods
+from davinci_forces.maths import selection
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
-from davinci_forces.maths.selection import (
-    MAX_GROUPS,
-    CrossValidation,
-    Equations,
-    Ridge,
-    choose_candidate,
-    covariance,
-    scaled_equations,
-    schemes_of,
-    standard_error,
-    sum_all,
-)
+from davinci_forces.maths.selection import MAX_GROUPS, CrossValidation, Equations, Ridge, standard_error, sum_all
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.records.prediction import CHOSEN
 
@@ -67,14 +57,14 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
     libraries = {id(part.library): part.library for c in candidates for part in c.parts}.values()
     together = [max(library.joints_moving.get(log, 0) for library in libraries) for log in range(count)]
-    schemes = schemes_of(np.concatenate([x.cells.by_block.squares for x in libraries], axis=1), together)
+    schemes = selection.schemes_of(np.concatenate([x.cells.by_block.squares for x in libraries], axis=1), together)
     pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes))] if schemes else []
     if not pairs:
         return None
     models, results = (list(column) for column in zip(*pairs, strict=True))
     physical = [c.is_physical for c in models]
     eligible = physical if any(physical) else [True] * len(models)
-    chosen, best = choose_candidate(results, [c.rank for c in models], eligible)
+    chosen, best = selection.choose_candidate(results, [c.rank for c in models], eligible)
     repeated = np.array([over_periods(c, count) for c in models])
     return Selection(
         candidates=tuple(models),
@@ -96,12 +86,12 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
 def better(fixed: Selection, searched: Selection | None) -> Selection:
     """Return the selection whose chosen candidate errs less, named `chosen`, with the candidates of both."""
     both = [fixed, *([searched] if searched else [])]
-    winner = min(both, key=lambda selection: selection.score_of(selection.chosen))
+    winner = min(both, key=lambda result: result.score_of(result.chosen))
     return replace(
         winner,
-        candidates=tuple(c for selection in both for c in selection.candidates),
-        physical=tuple(x for selection in both for x in selection.physical),
-        scores={name: np.concatenate([selection.scores[name] for selection in both]) for name in fixed.scores},
+        candidates=tuple(c for result in both for c in result.candidates),
+        physical=tuple(x for result in both for x in result.physical),
+        scores={name: np.concatenate([result.scores[name] for result in both]) for name in fixed.scores},
         chosen=winner.chosen._replace(variant=CHOSEN),
     )
 
@@ -154,12 +144,12 @@ def parameters(
         model = model_std(part, theta, noise, others, count)
         estimate = BlockEstimate(
             theta=theta,
-            theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
+            theta_std_classical=np.sqrt(np.diag(selection.covariance(total, ridge, errors / samples))),
             theta_std_noise=noise,
             theta_std_model=model,
             theta_std=np.hypot(noise, model),
             samples=int(samples.max()),
-            condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0][0]))),
+            condition=float(np.sqrt(np.linalg.cond(selection.scaled_equations(total, ridge)[0][0]))),
             **scores(part, theta),
         )
         yield part, estimate
@@ -210,7 +200,7 @@ def factor(equations: Equations, ridge: Ridge) -> Triangle:
 
     U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
     """
-    [scaled], [size] = scaled_equations(equations, ridge)
+    [scaled], [size] = selection.scaled_equations(equations, ridge)
     U = np.asarray(np.linalg.cholesky(scaled).T, np.float64)
     y = np.linalg.solve(U.T, ridge.weights @ equations.right[0] / size)
     return Triangle(U, y, max(float(ridge.weights @ equations.squares[0] - y @ y), 0.0), size)

@@ -22,23 +22,10 @@ from contextlib import suppress
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart, identity
+from davinci_forces.maths import selection
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.terms import offset
-from davinci_forces.maths.selection import (
-    MAX_GROUPS,
-    PATH_BLOCKS,
-    CrossValidation,
-    Equations,
-    LeftOut,
-    Ridge,
-    covariance,
-    scaled_equations,
-    schemes_of,
-    solve,
-    solve_each,
-    standard_error,
-    sum_all,
-)
+from davinci_forces.maths.selection import CrossValidation, Equations, LeftOut, Ridge
 from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 
 WITHOUT_TERM_0 = (", slope", ", curvature")  # corrections, so a model without one states that it is 0
@@ -64,9 +51,9 @@ def squares_of_ridge(part: CandidatePart, theta: Array, noise_std: Array) -> Arr
     """
     if part.ridge.strength <= WEAK_RIDGE:
         return np.zeros(len(theta))
-    total, ridge = sum_all(part.by_block), part.ridge
-    free = solve(total, ridge._replace(strength=WEAK_RIDGE))
-    [scaled], [size] = scaled_equations(total, ridge._replace(strength=SMALLEST_SQUARE))
+    total, ridge = selection.sum_all(part.by_block), part.ridge
+    free = selection.solve(total, ridge._replace(strength=WEAK_RIDGE))
+    [scaled], [size] = selection.scaled_equations(total, ridge._replace(strength=SMALLEST_SQUARE))
     squares, directions = np.linalg.eigh(scaled)
     free_variance = (directions**2 / np.maximum(squares, SMALLEST_SQUARE)).sum(axis=1) / size**2
     by_noise = noise_std**2 * (free_variance / unit_variance(part) - 1.0)
@@ -90,7 +77,7 @@ def models_to_compare(
         model
         for model, _, errors in models
         if identities(model) != own
-        if model is best_plain or errors.score - best.score <= MAX_WORSE * standard_error(errors, best)
+        if model is best_plain or errors.score - best.score <= MAX_WORSE * selection.standard_error(errors, best)
     ]
 
 
@@ -99,7 +86,7 @@ def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: 
 
     A slope or curvature that the model lacks is 0 there.  Of any other parameter that it lacks, the change is NaN.
     """
-    names, theta_of_model = identities(model), solve(sum_all(model.by_block), model.ridge)
+    names, theta_of_model = identities(model), selection.solve(selection.sum_all(model.by_block), model.ridge)
     variance, variance_of_model, squares = unit_variance(part), unit_variance(model), np.full(len(theta), np.nan)
     for i, name in enumerate(identities(part)):
         if name in names:
@@ -113,17 +100,17 @@ def squared_changes(part: CandidatePart, theta: Array, noise_std: Array, model: 
 
 def unit_variance(part: CandidatePart) -> Array:
     """Compute the variance (p,) of a model's parameters under white noise of variance 1 in its weighted efforts."""
-    return np.diag(covariance(sum_all(part.by_block), part.ridge, 1.0 / part.ridge.weights))
+    return np.diag(selection.covariance(selection.sum_all(part.by_block), part.ridge, 1.0 / part.ridge.weights))
 
 
 def std_over_blocks(part: CandidatePart, logs: int) -> Array:
     """Jackknife the standard errors (p,) of a model's parameters over blocks of path."""
-    return jackknife(part.by_block, part.ridge, np.tile(np.arange(PATH_BLOCKS), logs))
+    return jackknife(part.by_block, part.ridge, np.tile(np.arange(selection.PATH_BLOCKS), logs))
 
 
 def std_over_periods(part: CandidatePart, logs: int) -> Array:
     """Jackknife the standard errors (p,) of a model's parameters over periods, or over blocks of path without them."""
-    number, squares = np.tile(np.arange(MAX_GROUPS), logs), part.by_period.squares.sum(axis=1)
+    number, squares = np.tile(np.arange(selection.MAX_GROUPS), logs), part.by_period.squares.sum(axis=1)
     repeats = len(np.unique(number[squares > 0])) > 1
     return jackknife(part.by_period, part.ridge, number) if repeats else std_over_blocks(part, logs)
 
@@ -131,7 +118,7 @@ def std_over_periods(part: CandidatePart, logs: int) -> Array:
 def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:
     """Jackknife the standard errors (p,) of parameters over groups of cells, by their number (C,)."""
     groups = [number == n for n in np.unique(number) if cells.squares[number == n].any()]
-    return of_left_out(solve_each(cells.sum_groups(~out for out in groups), ridge))
+    return of_left_out(selection.solve_each(cells.sum_groups(~out for out in groups), ridge))
 
 
 def other_models(
@@ -144,7 +131,7 @@ def other_models(
     parts = [(p, not c.added) for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
     same = [(p, is_plain) for p, is_plain in parts if p.model.efforts == part.model.efforts]
     together = [part.library.joints_moving.get(log, 0) for log in range(logs)]
-    schemes = schemes_of(part.library.cells.scored.squares, together)
+    schemes = selection.schemes_of(part.library.cells.scored.squares, together)
     for model, is_plain in ((more, is_plain) for p, is_plain in same for more in with_offset(p)):
         with suppress(np.linalg.LinAlgError):
             yield model, is_plain, LeftOut(model.by_block, schemes, model.score_cells).cross_validate(model.ridge)

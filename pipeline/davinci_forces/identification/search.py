@@ -13,16 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.candidates import (
-    Candidate,
-    CandidatePart,
-    Library,
-    coupled_joints,
-    library,
-    ridge_name,
-    share_parameters,
-    weights_of,
-)
+from davinci_forces.identification import candidates
+from davinci_forces.identification.candidates import Candidate, CandidatePart, Library, coupled_joints
 from davinci_forces.identification.observations import Observed, Processing
 from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -98,7 +90,8 @@ class JointSearch:
         key = processing, terms
         if key not in self._libraries:
             logs = [log.process([processing] * len(log.records)) for log in self.logs]
-            self._libraries = {key: library(self.model(terms), logs, len(logs))}  # only the last one is used again
+            equations = candidates.library(self.model(terms), logs, len(logs))
+            self._libraries = {key: equations}  # only the last one is used again
         return self._libraries[key]
 
     def step(
@@ -268,17 +261,18 @@ def searched_candidates(
     models = [Candidate(name, CHOSEN, describe_terms(best), tuple(parts))]
     coupled = [search for search in searches if search.structure == "coupled"]
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
-    if len(coupled) == len(separate) and share_parameters(robot, rows):
+    if len(coupled) == len(separate) and candidates.share_parameters(robot, rows):
         alone_parts = [searched_part(robot, search, arm, count) for search in coupled]
-        weights = weights_of(alone_parts)
+        weights = candidates.weights_of(alone_parts)
         for alone in [None, *range(len(coupled))] if len(coupled) > 2 else [None]:
             sharing = [i for i in range(len(coupled)) if i != alone]
             part = shared_part(robot, [coupled[i] for i in sharing], arm, count, weights[sharing])
             name = "" if alone is None else f" except for {coupled[alone].joint}"
             separately = () if alone is None else (alone_parts[alone],)
             for strength in RIDGE_GRID:
-                full_name, joined = f"searched, links shared{name}{ridge_name(strength)}", part.with_ridge(strength)
-                models.append(Candidate(full_name, CHOSEN, describe_terms(coupled), (joined, *separately)))
+                full_name = f"searched, links shared{name}{candidates.ridge_name(strength)}"
+                joined = (part.with_ridge(strength), *separately)
+                models.append(Candidate(full_name, CHOSEN, describe_terms(coupled), joined))
     return models
 
 
@@ -291,7 +285,7 @@ def shared_part(
     processing = {search.joint: search.chosen.processing for search in searches}
     by_joint = [processing.get(joint, arm[0].processing[0]) for joint in joints]
     model = coupled_joints(robot, [joints.index(search.joint) for search in searches], terms, CHOSEN)
-    equations = library(model, [log.process(by_joint) for log in arm], count)
+    equations = candidates.library(model, [log.process(by_joint) for log in arm], count)
     return CandidatePart(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
 
 
@@ -299,7 +293,7 @@ def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], 
     """Return the chosen model of a joint, with the equations of all its logs."""
     step = search.chosen
     model = joint_model(robot, search.joint, search.structure, step.terms)
-    equations = library(model, [log.process([step.processing] * len(log.records)) for log in logs], count)
+    equations = candidates.library(model, [log.process([step.processing] * len(log.records)) for log in logs], count)
     ridge = Ridge(step.strength, np.ones(1), equations.combination)
     return CandidatePart(model, equations, equations.columns(model), ridge)
 

@@ -4,30 +4,15 @@ import math
 import re
 from functools import lru_cache
 
-# name -> (what it measures, its size in SI)
-UNITS: dict[str, tuple[str, float]] = {
-    "rad": ("angle", 1.0),
-    "mrad": ("angle", 1e-3),
-    "deg": ("angle", math.pi / 180),
-    "rev": ("angle", 2 * math.pi),
-    "m": ("length", 1.0),
-    "cm": ("length", 1e-2),
-    "mm": ("length", 1e-3),
-    "um": ("length", 1e-6),
-    "s": ("time", 1.0),
-    "ms": ("time", 1e-3),
-    "us": ("time", 1e-6),
-    "ns": ("time", 1e-9),
-    "min": ("time", 60.0),
-    "h": ("time", 3600.0),
-    "day": ("time", 86400.0),
-    "A": ("current", 1.0),
-    "mA": ("current", 1e-3),
-    "N": ("force", 1.0),
-    "mN": ("force", 1e-3),
-    "N m": ("torque", 1.0),
-    "mN m": ("torque", 1e-3),
+SIZES = {  # what units measure -> their sizes in SI
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "rev": 2 * math.pi},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "force": {"N": 1.0, "mN": 1e-3},
+    "torque": {"N m": 1.0, "mN m": 1e-3},
 }
+UNITS = {unit: (kind, size) for kind, sizes in SIZES.items() for unit, size in sizes.items()}
 UNITS |= {f"{u}/s": (f"{kind} rate", size) for u, (kind, size) in UNITS.items() if kind in ("angle", "length")}
 UNITS["rpm"] = ("angle rate", 2 * math.pi / 60)
 

@@ -14,7 +14,7 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
 from davinci_forces.maths.simulation.surroundings import UP, Surroundings
-from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
+from davinci_forces.simulation.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
 NEGLIGIBLE = 1e-9  # in SI units: a parameter below this is 0, so that a model may omit it
 SIGNIFICANT_DIGITS = 12  # digits of true parameters from the links; further digits depend on the machine

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.simulation.motion import SimulatedMotion
-from davinci_forces.simulation.scenario.scenario import ForceSensor, SensorNoise, SimulatedJoint
+from davinci_forces.simulation.scenario import ForceSensor, SensorNoise, SimulatedJoint
 
 GROUP = "Motors"
 DESCRIPTION = "SIMULATED data, not a recording of a robot"

@@ -14,7 +14,7 @@ from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.signals.windows import spans
 from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, simulate_log, theta
-from davinci_forces.simulation.scenario.scenario import Scenario, SimulatedLog, SimulatedPush
+from davinci_forces.simulation.scenario import Scenario, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
 STUDY, TRUTH = "study.toml", "truth.toml"

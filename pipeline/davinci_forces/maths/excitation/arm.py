@@ -23,14 +23,8 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, GRADIENTS, Fourier, basis, instants
-from davinci_forces.maths.excitation.joint import (
-    ExcitationProblem,
-    extremes,
-    impossible,
-    limit_share,
-    shrink_into_limits,
-)
-from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_into_arm_limits
+from davinci_forces.maths.excitation.joint import ExcitationProblem, extremes, impossible, limit_share, shrink_to_limits
+from davinci_forces.maths.excitation.limits import NO_OBSTACLES, ArmLimits, Obstacles, shrink_to_arm_limits
 from davinci_forces.maths.excitation.search import ReportStart, best_of_starts
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain, fold_fixed_links
@@ -168,10 +162,10 @@ def _result(stage: Stage, z: Array) -> tuple[list[Fourier], float]:
     """A trajectory shrunk into all limits, and its criterion."""
     joints = stage.problem.joints
     series = [
-        shrink_into_limits(joint, Fourier.from_coefficients(x, joint.period))
+        shrink_to_limits(joint, Fourier.from_coefficients(x, joint.period))
         for joint, x in zip(joints, stage.coefficients(z), strict=True)
     ]
-    within = shrink_into_arm_limits(stage.problem.limits, series)
+    within = shrink_to_arm_limits(stage.problem.limits, series)
     if within is None:
         return series, np.inf
     return within, float(CRITERIA[joints[0].criterion](arm_observation(stage.problem, within)))

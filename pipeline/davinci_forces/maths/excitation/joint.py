@@ -83,7 +83,7 @@ def design(problem: ExcitationProblem, starts: int, seed: int, report_start: Rep
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")
     x = trajectories(problem, best[None])[0]
-    return Design(shrink_into_limits(problem, Fourier.from_coefficients(x, problem.period)), values)
+    return Design(shrink_to_limits(problem, Fourier.from_coefficients(x, problem.period)), values)
 
 
 def trajectories(problem: ExcitationProblem, z: Array) -> Array:
@@ -91,7 +91,7 @@ def trajectories(problem: ExcitationProblem, z: Array) -> Array:
     return scale_to_limits(delay(*from_standstill(z, problem.samples)), problem.limits, problem.period)
 
 
-def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
+def shrink_to_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
     """Shrink the series towards rest at the mean position until every limit holds at every instant.
 
     The trajectories within the limits are a convex set, so the factor follows from the exact extrema of the series.

@@ -101,7 +101,7 @@ class ArmLimits:
         return np.flatnonzero(np.ptp(frames(self.chain, q)[..., :3, 3], axis=0).max(axis=-1) > MIN_FRAME_TRAVEL)
 
 
-def shrink_into_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[Fourier] | None:
+def shrink_to_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[Fourier] | None:
     """Shrink all series towards rest at their means until the limits hold at every instant; None if rest breaks one."""
     t = np.linspace(0.0, series[0].period, INSTANTS + 1)
     q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(motion(s, t) for s in series), strict=True))

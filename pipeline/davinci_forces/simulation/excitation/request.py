@@ -10,13 +10,8 @@ import numpy as np
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.arm import (
-    ArmExcitationProblem,
-    arm_observation,
-    arm_problem,
-    design_together,
-    parameter_of,
-)
+from davinci_forces.maths.excitation import arm
+from davinci_forces.maths.excitation.arm import ArmExcitationProblem
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition, expected_std
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.maths.excitation.limits import ArmLimits, Box, Obstacles
@@ -24,12 +19,7 @@ from davinci_forces.maths.excitation.search import ReportStart
 from davinci_forces.maths.models.coupled import LINK_UNITS
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.simulation.excitation.trajectory import (
-    PERIODS,
-    ExcitationTrajectory,
-    ExpectedParameter,
-    coefficient_names,
-)
+from davinci_forces.simulation.excitation.trajectory import PERIODS, ExcitationTrajectory, ExpectedParameter
 from davinci_forces.toml import unlikely
 
 STARTS, STARTS_OF_ARM = 24, 2  # an arm's starts take longer, and agree better
@@ -89,8 +79,8 @@ def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
         raise BadRequest(f"--criterion is one of {', '.join(CRITERIA)}, not {request.criterion!r}")
     if request.period is not None and not (math.isfinite(request.period) and request.period > 0):
         raise BadRequest(f"--period must be positive, not {request.period:g}")
-    if problem := unlikely("--period", request.period or 0.0, "period"):
-        raise BadRequest(f"{problem}, not {request.period:g}")
+    if unusual := unlikely("--period", request.period or 0.0, "period"):
+        raise BadRequest(f"{unusual}, not {request.period:g}")
     if all_joints and request.evaluate:
         raise BadRequest("--evaluate takes one joint; name it instead of `all`")
     if _obstacles(request).present and (not all_joints or robot.chain is None):
@@ -100,8 +90,8 @@ def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
     noise = _noise(request.noise, len(joints))
     if all_joints and robot.chain is not None:
         efforts = [joint.limits.effort for joint in joints]
-        arm = arm_problem(robot.chain, problems, robot.bodies, efforts, _obstacles(request))
-        return _of_arm(request, robot, arm, noise, report_start)
+        problem = arm.arm_problem(robot.chain, problems, robot.bodies, efforts, _obstacles(request))
+        return _of_arm(request, robot, problem, noise, report_start)
     excitations = [_excitation(request, *part, report_start) for part in zip(joints, problems, noise, strict=True)]
     return Answer(excitations, held=tuple(j.name for j in robot.joints if robot.chain is not None and j not in joints))
 
@@ -110,10 +100,10 @@ def _of_arm(
     request: Request, robot: Robot, problem: ArmExcitationProblem, noise: list[float], report_start: ReportStart | None
 ) -> Answer:
     try:
-        series, optima = design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)
+        series, optima = arm.design_together(problem, request.starts or STARTS_OF_ARM, request.seed, report_start)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
-    F = arm_observation(problem, series)
+    F = arm.arm_observation(problem, series)
     value, cond = float(CRITERIA[request.criterion](F)), float(10 ** condition(F))
     standard_errors = _standard_errors(robot, problem, F, noise) if request.noise else ()
     parts = zip(robot.joints, problem.joints, series, strict=True)
@@ -129,7 +119,7 @@ def _standard_errors(
     """The standard errors of the arm's base parameters, each named by the column that it leads with."""
     std, parameters = expected_std(F, np.tile(noise, len(F) // len(noise))), list[ExpectedParameter]()
     for column, value in zip(problem.columns.tolist(), std.tolist(), strict=True):
-        joint, name = parameter_of(problem, column)
+        joint, name = arm.parameter_of(problem, column)
         if joint is None:
             parameters.append(ExpectedParameter(name, LINK_UNITS[column % 10], value))
         else:
@@ -166,8 +156,7 @@ def _excitation(
         return ExcitationTrajectory(joint, problem, best.series, tuple(best.optima.tolist()), noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
-        names = ",".join(coefficient_names(2))
-        raise BadRequest(f"--evaluate takes {names}, or a0 and a pair for each harmonic, not {len(x)} numbers")
+        raise BadRequest(f"--evaluate takes a0,a1,b1,a2,b2, or a0 and a pair for each harmonic, not {len(x)} numbers")
     problem = replace(problem, harmonics=(len(x) - 1) // 2)
     return ExcitationTrajectory(joint, problem, Fourier.from_coefficients(np.array(x), problem.period), noise=noise)
 

@@ -11,7 +11,7 @@ import numpy as np
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.simulation.surroundings import SHAPES, Path
 from davinci_forces.robots.from_toml import NAME
-from davinci_forces.simulation.scenario.scenario import ForceSensor, SimulatedJoint, SimulatedLog, SimulatedPush, Tissue
+from davinci_forces.simulation.scenario import ForceSensor, SimulatedJoint, SimulatedLog, SimulatedPush, Tissue
 from davinci_forces.study.entries import ROLES
 from davinci_forces.toml import TomlTable
 

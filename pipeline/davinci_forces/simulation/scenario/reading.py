@@ -14,15 +14,8 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.simulation.actuators import Cascade, Motors, Regulator
 from davinci_forces.maths.simulation.step import Friction
 from davinci_forces.robots.robot import Robot
+from davinci_forces.simulation.scenario import BadScenario, Family, Scenario, SensorNoise, SimulatedArm, SimulatedJoint
 from davinci_forces.simulation.scenario.logs import logs_of
-from davinci_forces.simulation.scenario.scenario import (
-    BadScenario,
-    Family,
-    Scenario,
-    SensorNoise,
-    SimulatedArm,
-    SimulatedJoint,
-)
 from davinci_forces.toml import TomlTable
 
 MAX_SAMPLES = 10_000_000  # samples in a log

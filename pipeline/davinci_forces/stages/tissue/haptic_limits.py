@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, tracker
-from davinci_forces.filters.problem import stationary_joint
+from davinci_forces.filters.problem import joint_at_rest
 from davinci_forces.filters.response import noise_model
 from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
@@ -86,7 +86,7 @@ def filtered_recordings(
     direct = {comparison.log: comparison.tau_ext for comparison in of_joint if comparison.filter == "direct"}
     for c in (c for c in of_joint if c.default and c.log in direct and len(c.t) > 1):
         T_s, inertia = float(c.t[1] - c.t[0]), np.full(len(c.t), tuned.inertia)
-        at_rest = stationary_joint(inertia, tuned.viscous, direct[c.log], T_s, tuned.r_tau)
+        at_rest = joint_at_rest(inertia, tuned.viscous, direct[c.log], T_s, tuned.r_tau)
         yield c.t, tracker(DEFAULT)(at_rest, noise_model(tuned, joint, T_s, q_tau)).tau_ext, c.tau_ext
 
 
