@@ -22,10 +22,7 @@ class Tuning(LogJointRecord):
 
 
 class FilterNoise(JointRecord):
-    """The noise that the filter assumes of a joint: the median of its identification logs.
-
-    The columns have what another `delay` would cost: the standard deviation of the filter at rest.
-    """
+    """The noise that the filter assumes of a joint: the median of its identification logs."""
 
     PUBLISHED = ("tuning.{joint}: r_q r_dq r_tau q_tau",)
 
@@ -39,36 +36,30 @@ class FilterNoise(JointRecord):
     inertia: float
     viscous: float
     trial_delay: Column
-    trial_std: Column
+    trial_std: Column  # standard deviation of the filter at rest, with this delay instead of `delay`
 
 
 class FreeMotion(LogJointRecord):
-    """The smoother's external effort on one joint of a log of free motion, with a fit that did not use that log.
-
-    It has at most 1000 rows, evenly spaced; each stands for so many uncorrelated samples.
-    """
+    """The smoother's external effort on one joint of a log of free motion, with a fit that did not use that log."""
 
     path: str
     scheme: str
     tested: int
     block: Counts
-    dq: Column
+    dq: Column  # of at most 1000 samples, evenly spaced
     tau_ext_smooth: Column
     tau_ext_std_filter: Column
-    uncorrelated: Column
+    uncorrelated: Column  # number of uncorrelated samples for which the row stands
 
 
 class ErrorBand(JointRecord):
-    """The errors of a joint's smoothed external effort in free motion outside the fit, of at most 20 logs.
-
-    The band of a log uses the rows of the other logs.
-    """
+    """The errors of a joint's smoothed external effort in free motion outside the fit, of at most 20 logs."""
 
     PUBLISHED = ("band.{joint}: band_rms±",)
 
     band_rms: float
     band_rms_std: float
-    source: Labels
+    source: Labels  # the log of the row; the band of a log uses the rows of the others
     path_of: Labels
     block: Counts
     dq: Column
@@ -136,10 +127,7 @@ class Track(LogJointRecord):
 
 
 class FreeSpace(LogJointRecord):
-    """The external effort of smoother or filter on one joint of one log, where nothing touched the robot.
-
-    A row is a quartile of speed in motion; there are none if the joint hardly moves.
-    """
+    """The external effort of smoother or filter on one joint of one log, where nothing touched the robot."""
 
     KEY = ("log", "joint", "filter")
 
@@ -157,7 +145,7 @@ class FreeSpace(LogJointRecord):
     band_width: float
     free_max: float
     crossings: float
-    quartile_coverage: Column
+    quartile_coverage: Column  # by quartile of speed in motion; none if the joint hardly moves
     quartile_coverage_std: Column
 
     @property
@@ -174,10 +162,7 @@ class FreeSpace(LogJointRecord):
 
 
 class Threshold(JointRecord):
-    """The detection level for contacts on a joint: the level of the log with the largest effort in free space.
-
-    The coverage of the band is the mean over the same logs, those that were not fitted if there are any.
-    """
+    """The detection level for contacts on a joint: the level of the log with the largest effort in free space."""
 
     KEY = ("joint", "filter")
     PUBLISHED = ("threshold.{joint}: detection_level± alarm_level±", "band.{joint}: coverage± band_width")
@@ -188,18 +173,14 @@ class Threshold(JointRecord):
     alarm_level: float
     alarm_level_std: float
     level_from: str  # the log whose free space it is
-    tested: int  # logs
-    coverage: float
+    tested: int  # logs: those that were not fitted, if there are any
+    coverage: float  # mean over these logs
     coverage_std: float
     band_width: float
 
 
 class Contact(LogJointRecord):
-    """The contacts of one joint in one log: its effort on the environment, and its detection level.
-
-    The windows that the study states come first, then other detected contacts.  A window without a detected contact
-    keeps its stated start and end.
-    """
+    """The contacts of one joint in one log: its effort on the environment, and its detection level."""
 
     PUBLISHED = ("contact.{log}.{joint}.{row}: peak± mean± impulse± onset± release± duration± above stated found",)
 
@@ -207,9 +188,9 @@ class Contact(LogJointRecord):
     detection_level: float
     alarm_level: float
     level_from: str  # the log whose free space sets the detection level
-    stated: Counts
+    stated: Counts  # whether the study states the window; these come first, then other detected contacts
     found: Counts
-    onset: Column
+    onset: Column  # of the stated window, if no contact was detected in it; so for the release
     onset_std: Column
     release: Column
     release_std: Column
@@ -260,17 +241,14 @@ class StreamLevel(JointRecord):
 
 
 class Comparison(LogJointRecord):
-    """One filter on one joint of a log: its effort in free space, and its response to a push added in software.
-
-    The free space of the default filter, and of the smoother with its noise, is in FreeSpace.
-    """
+    """One filter on one joint of a log: its effort in free space, and its response to a push added in software."""
 
     KEY = ("log", "joint", "filter")
     PUBLISHED = ("{filter}.{log}.{joint}: push_share push_delay",)
 
     filter: str
     role: str
-    default: int
+    default: int  # whether it is the default filter, whose free space is in FreeSpace, as is that of the smoother
     free_rms: float
     free_rms_std: float
     free_level: float

@@ -218,18 +218,15 @@ class ModelSearch(JointRecord):
 
 
 class FrictionMap(LogJointRecord):
-    """The effort of one joint in one log minus a fit's terms except friction, and the fit's friction, over velocity.
-
-    Each row is the mean over a range of velocity, separately for increasing and for decreasing speed.
-    """
+    """The effort of one joint in one log minus a fit's terms except friction, and the fit's friction, over velocity."""
 
     KEY = ("log", "joint", "model", "estimator")
 
     model: str
     estimator: str
     role: str
-    dq: Column
-    gaining: Counts
+    dq: Column  # mean of a range of velocity
+    gaining: Counts  # whether the row is of increasing speed
     tau_friction: Column
     tau_friction_std: Column
     tau_friction_hat: Column

@@ -10,15 +10,12 @@ SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 
 
 class Prediction(LogJointRecord):
-    """The effort of a log that was left out of a fit, and the effort that the fit predicts for that log.
-
-    For the chosen model, `model` is `CHOSEN` or `CHOSEN_BY_LOG`, and `estimator` names its fit.
-    """
+    """The effort of a log that was left out of a fit, and the effort that the fit predicts for that log."""
 
     KEY = ("log", "joint", "model", "estimator")
 
-    model: str
-    estimator: str
+    model: str  # `CHOSEN` or `CHOSEN_BY_LOG` for the chosen model
+    estimator: str  # of the chosen model, the name of its fit
     role: str
     scheme: str  # "validation", "contact", "leave one log out", "leave 5 logs out", ...
     path: str  # "another path" than the fitted ones, or the "same path", on which the model's error repeats
@@ -72,10 +69,7 @@ class PathShare(LogJointRecord):
 class JointModel(LogJointRecord):
     """The model of one joint along one log, with the fit that the setting `fit` selects:
 
-        inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
-
-    `tau_hat_unseen` is the effort of an identification log from refits without the sample, or NaN where there are none.
-    It is NaN in all other logs, which no fit uses.
+    inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
     """
 
     UNKNOWN = ("tau_hat_unseen",)
@@ -113,4 +107,4 @@ class JointModel(LogJointRecord):
     inertia: Column
     tau_known: Column
     tau_hat: Column
-    tau_hat_unseen: Column
+    tau_hat_unseen: Column  # in an identification log, by refits without the sample; NaN elsewhere

@@ -13,22 +13,16 @@ class JointCorrelation(LogRecord):
 
 
 class ArmCorrelation(RobotRecord):
-    """The correlation of the external efforts of the joints that carry the tip, in free space, of at most 20 logs.
+    """The correlation of the external efforts of the joints that carry the tip, in free space, of at most 20 logs."""
 
-    The correlation for a log uses the rows of the other logs.
-    """
-
-    source: Labels
+    source: Labels  # the log of the row; the correlation for a log uses the rows of the others
     rho_12: Column
     rho_13: Column
     rho_23: Column
 
 
 class TipForce(LogRecord):
-    """The force that the tip exerts on its environment during one log, in base axes, with its covariance.
-
-    It follows from the external efforts without delay, for contact at the tip alone; NaN at singular poses.
-    """
+    """The force that the tip exerts on its environment during one log, in base axes, with its covariance."""
 
     UNKNOWN = ("f_x", "f_y", "f_z", "c_xx", "c_yy", "c_zz", "c_xy", "c_xz", "c_yz")
     PUBLISHED = (
@@ -58,7 +52,7 @@ class TipForce(LogRecord):
     x: Column
     y: Column
     z: Column
-    f_x: Column
+    f_x: Column  # without delay, for contact at the tip alone; NaN at singular poses
     f_y: Column
     f_z: Column
     c_xx: Column
@@ -72,15 +66,12 @@ class TipForce(LogRecord):
 
 
 class TipContact(LogRecord):
-    """The force at the tip in each contact of one log, at the time at which it is largest.
-
-    The windows that the study states come first, then other contacts detected on any joint.
-    """
+    """The force at the tip in each contact of one log, at the time at which it is largest."""
 
     PUBLISHED = ("tip.{log}.{row}: onset release f_x± f_y± f_z± peak=f_peak± sigma_1± sigma_2± sigma_3±",)
 
     filter: str
-    stated: Counts
+    stated: Counts  # whether the study states the window; these come first, then other contacts of any joint
     onset: Column
     release: Column
     t_peak: Column

@@ -71,12 +71,9 @@ class Innovation(LogJointRecord):
 
 
 class Explanation(LogJointRecord):
-    """The reason why the innovations of the default filter are not white; a row tests one omission or correction.
+    """The reason why the innovations of the default filter are not white; a row tests one omission or correction."""
 
-    `finding` is white, left out, mended, or unexplained.
-    """
-
-    finding: str
+    finding: str  # white, left out, mended, or unexplained
     verdict: str
     clock_std: float
     without: Labels
