@@ -436,16 +436,18 @@ def test_contact_told_by_the_efforts_of_several_joints_is_to_be_checked(tmp_path
 
 
 def test_rostopic_s_columns_of_names_tell_the_joints(tmp_path):
-    t, *signals = recorded(0, 3, repeats=True)
-    columns = [f"field.{word}{k}" for word in ("name", "position", "velocity", "effort") for k in range(3)]
+    t, *signals = recorded(0, 4, repeats=True)
+    columns = [f"field.{word}{k}" for word in ("name", "position", "velocity", "effort") for k in range(4)]
     with (tmp_path / "run.csv").open("w") as file:
         file.write(f"%time,{','.join(columns)}\n")
         for row in zip(t, *signals, strict=True):
             cells = [f"{x:.6f}" for part in row[1:] for x in part]
             stamp = 1764000000000000000 + round(row[0] * 1e9)
-            file.write(f"{stamp},outer_yaw,outer_pitch,outer_insertion,{','.join(cells)}\n")
+            file.write(f"{stamp},outer_yaw,outer_pitch,outer_insertion,outer_roll,{','.join(cells)}\n")
     call("new", tmp_path)
     [entry] = reading.read(tmp_path).logs
     found = {source.quantity: source.channel for source in entry.channels}
     assert found.get("hand_roll.q") == "field.position0", found
     assert found["instrument_slide.tau"] == "field.effort2"
+    other = '# "<joint>.<quantity>" = "field.effort3"  # field.effort[outer_roll], no joint of dvrk_psm'
+    assert other in (tmp_path / "study.toml").read_text()

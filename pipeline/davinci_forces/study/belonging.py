@@ -80,13 +80,14 @@ def arm_of(
         described = [arm for arm in arms if arm.reason]
         return described[0] if len(described) == 1 else next(arm for arm in arms if arm.name == DEFAULT_ROBOT)
     words = {word for name in names for word in words_of(name)}
+    current = any("i" in holding.symbols() for holding in counted)
+    of_the_kit = words & {"psm", "dvrk"} or ("yaw" in words and not current)
     for arm in arms:
         if any(holding.robot == arm.robot for holding in counted):
-            if arm.name == DEFAULT_ROBOT and words & {"psm", "dvrk"}:  # the kit's joints have the same names
+            if arm.name == DEFAULT_ROBOT and of_the_kit:  # the kit's joints have the same names
                 arm = Arm("dvrk_psm", robots.load("dvrk_psm", folder), "")
             return arm._replace(reason=arm.reason or "by the joints in channel names")
     n = max(holding.joints for holding in counted)
-    current = any("i" in holding.symbols() for holding in counted)
     beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
     if beside:
         return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")

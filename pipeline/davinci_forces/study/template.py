@@ -114,7 +114,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
-    names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]
+    channels = [channel.alias or channel.name for draft in drawn for channel in draft.log.channels]
+    names = [folder.resolve().name, *(file.name for file in files), *channels]
     arm = stated[0] if stated else belonging.arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
     drawn = _named_as(arm.robot, drawn)
     roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
@@ -389,6 +390,7 @@ class _Writer:
             else:
                 symbol = without_joint.get(channel.name, "")
                 notes = ["MISSING: the joint"] * bool(symbol) + [f"in {channel.unit}"] * bool(channel.unit)
+                notes += [f"{channel.alias}, no joint of {self.robot.name}"] * ("[" in channel.alias)
                 comment = f"  # {'; '.join(notes)}" if notes else ""
                 yield f'# "<joint>.{symbol or "<quantity>"}" = {_text(channel.name)}{comment}'
 
