@@ -192,6 +192,19 @@ def test_the_labels_of_the_research_kit_are_its_joints_and_its_roll_is_of_the_wr
     assert len(held) == 10
 
 
+def test_two_joints_of_the_research_kit_are_known_by_its_labels(tmp_path):
+    t, q, dq, tau = recorded(0, 2, repeats=True)
+    labels = ("outer_yaw", "outer_pitch")
+    header = ["t", *(f"{symbol}[{label}]" for symbol in ("position", "velocity", "effort") for label in labels)]
+    table(tmp_path / "run.csv", t, 0.05 * q, 0.05 * dq, tau, header=",".join(header))
+    call("new", tmp_path)
+    study = reading.read(tmp_path)
+    held = {source.quantity: source.channel for source in study.logs[0].channels}
+    assert (study.robot.name, held["hand_roll.q"], held["hand_pitch.tau"]) == (
+        "dvrk_psm", "position[outer_yaw]", "effort[outer_pitch]"
+    )  # fmt: skip
+
+
 def test_joints_in_another_order_go_by_their_names_where_a_robot_has_them(tmp_path):
     t, q, dq, tau = recorded(0, 2, repeats=True)
     header = ["t", *(f"/js/{joint}/{s}" for s in ("position", "velocity", "effort") for joint in ("elbow", "base"))]

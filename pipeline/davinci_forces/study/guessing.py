@@ -133,6 +133,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     """Assign channels whose names name a joint of the robot: `Roll motor angle`."""
     named = {channel.name: words_of(channel.alias or channel.name) for channel in channels if not is_time(channel)}
     of_the_kit = all(any(label & {*words} for words in named.values()) for label in (INSERTION_WORDS, {"yaw"}))
+    of_the_kit |= any({"outer", "yaw"} <= {*words} for words in named.values())
     meanings: dict[str, Meaning] = {}
     for channel in channels:
         words = named.get(channel.name, [])
