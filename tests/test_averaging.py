@@ -150,6 +150,26 @@ def test_a_trajectory_whose_first_harmonic_is_nil_keeps_the_period_that_is_state
     assert not notes
 
 
+@pytest.mark.parametrize("asked", [0, 2])
+def test_a_motion_with_more_harmonics_than_its_joint_has_repeats_as_exactly(asked):
+    """With the joint's two, the others would be taken for noise: the period off by 0.02 s, and periods left out."""
+    length, noise = 6.4806, 1e-4
+    t = np.arange(round(6 * length * 100)) / 100
+    turn = 2 * np.pi / length * np.arange(1, 6)
+    angle, size = np.outer(t, turn) + np.arange(5) ** 2, 0.5 / np.arange(1, 6)
+    q, dq = np.sin(angle) @ size, np.cos(angle) @ (size * turn)
+    random = np.random.default_rng(2).normal(size=(3, len(t)))
+    zero = np.zeros(len(t), int)
+    moved = replace(arm.signal("hand_roll"), t=t, q=q + noise * random[0], dq=dq + 1e-3 * random[1],
+                    tau=0.3 * dq + 0.2 * np.sign(dq) + 0.01 * random[2], segment=zero, filled=zero)  # fmt: skip
+    assert arm.ARM.joint("hand_roll").harmonics == 2
+    made = list(average.run([moved], entry(), arm.ARM, harmonics=asked, lowpass=17.0))
+    [found] = [record for record in made if isinstance(record, Average)]
+    assert abs(found.period - length) < 6 * found.period_std < 6e-5
+    assert (found.periods, found.t_start) == (6, 0.0)
+    assert found.sigma_q == pytest.approx(noise, rel=0.2)
+
+
 def test_the_joints_of_a_log_share_one_period_and_one_at_rest_is_noted():
     from dataclasses import replace
 

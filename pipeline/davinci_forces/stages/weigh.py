@@ -31,7 +31,7 @@ from davinci_forces.maths.contact.weighing import (
 )
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import refine
-from davinci_forces.maths.periods.repetition import repetition
+from davinci_forces.maths.periods.repetition import harmonics_of, repetition
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
@@ -135,7 +135,7 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
     match = repetition(positions)
     if match is None:
         return 0.0
-    orders = max(robot.joint(motion.joint).harmonics for motion in motions)
+    orders = harmonics_of(positions, match, max(robot.joint(motion.joint).harmonics for motion in motions))
     return refine(motions[0].t[part], positions, match.lag / motions[0].rate, orders)
 
 

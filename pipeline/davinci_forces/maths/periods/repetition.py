@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.periods.harmonics import amplitudes, last_above
 from davinci_forces.maths.signals.windows import runs
 
 POINTS = 1024  # a search reduces a recording to this number of points, each the mean of neighbouring samples
@@ -19,6 +20,8 @@ ROUNDED = 1e-5  # difference that remains if the period lies between two points
 LAG_PARTS = 200  # the difference is taken as a parabola over one of this number of parts of a lag
 PERIODS_SEARCHED = 4.2  # a shorter period is searched within this number of periods
 MIN_LENGTH_RATIO = 0.8  # a section of at least this share of the longest one is as good as the longest
+MIN_HARMONIC = 0.01  # share of the largest harmonic, above which a signal has a harmonic
+SAMPLES_PER_TURN = 8  # at least, of the highest harmonic
 MIN_RUN_SHARE = 0.25  # a section with a smaller share of a recording may repeat by chance
 
 
@@ -45,6 +48,16 @@ def repetition(signals: Sequence[Array]) -> Repetition | None:
         if match is not None:
             return _shorten(x, Repetition(match.lag, match.start + start, match.stop + start, match.best_start + start))
     return None
+
+
+def harmonics_of(signals: Sequence[Array], repeat: Repetition, least: int) -> int:
+    """The number of harmonics, at least `least`, that any of the signals (N,) has in a period of the repetition.
+
+    With fewer, the others would be taken for noise, and the period would be uncertain by as much.
+    """
+    one = slice(repeat.best_start, repeat.best_start + round(repeat.lag))
+    found = max((last_above(amplitudes(x[one]), MIN_HARMONIC) for x in signals), default=0)
+    return max(least, min(found, int(repeat.lag / SAMPLES_PER_TURN)))
 
 
 def _parts(N: int) -> Iterator[tuple[int, int]]:

@@ -121,7 +121,8 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
         HBand(-level, level, "detection level" if named else ""),
         Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
     )
-    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks)
+    whole = (0.0, max(len(peak), 3) + 1.0)  # numbered by whole windows
+    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks, x_range=whole)
 
 
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:

@@ -11,7 +11,7 @@ from davinci_forces.maths.periods import averaging
 from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, multiple_of_period, stretch
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
-from davinci_forces.maths.periods.repetition import Repetition, repetition
+from davinci_forces.maths.periods.repetition import Repetition, harmonics_of, repetition
 from davinci_forces.maths.signals.smoothing import lowpass_segments, noise_std, segments, share_passed
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
@@ -48,12 +48,13 @@ def run(
             "to identify; name the channels of the joint that moves, or check their units, and the clock, of "
             f"{signals[0].rate:.4g} Hz"
         )
-    max_harmonics = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
+    least = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)
     if repeat is None:
         message = f"{no_repetition_message(moving[0], entry)}, so nothing is averaged"
         yield diagnostic("average", entry.name, "note", f"{message}; parameters are fitted to its low-passed samples")
         return
+    max_harmonics = harmonics_of([signal.q for signal in moving], repeat, least)
     periodic, length = longest_stretch(moving, repeat, max_harmonics, entry)
     # A derived velocity says nothing that its position does not, and its low-pass errs at the ends of a recording.
     compared = [(x, symbol) for x in moving for symbol in MEASURED if symbol != "dq" or x.velocity == "logged"]
