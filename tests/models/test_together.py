@@ -70,7 +70,9 @@ def test_the_consistent_inertia_of_a_joint_by_itself_is_one_that_a_filter_can_di
     fits = {f.estimator: f for f in made if isinstance(f, Fit) and f.model == "chosen"}
     free, held = (dict(zip(f.parameter, f.theta, strict=True)) for f in (fits["ridge"], fits["consistent"]))
     inertias = [sum(theta for name, theta in x.items() if name in ("inertia", "lifted mass")) for x in (free, held)]
-    assert inertias[0] < 0 < inertias[1] < 0.5
+    assert inertias[0] < 0
+    share = inertias[1] * np.sqrt(np.mean(backward.ddq**2) / np.mean(backward.tau**2))
+    assert share == pytest.approx(1e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize(("added", "estimator"), [(0.31, "consistent"), (-0.2, "ridge")])
