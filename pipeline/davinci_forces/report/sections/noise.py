@@ -23,7 +23,7 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
         "joints' motion repeats; remarks on the recordings name the samples outside this interval."
     )
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for a in averages:
         key, period = f"noise.{a.log}.{a.joint}", context.number(f"period.{a.log}", 6)
         share = context.number(f"{key}.relative_noise", 2, std=None)
@@ -33,7 +33,7 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
         "repeat, over the RMS effort. It is part of every relative error, as no model can remove it."
     )
-    yield Table(caption, header, tuple(rows), "noise-table", "llrrrrr")
+    yield Table(caption, header, rows, "noise-table", "llrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)

@@ -153,7 +153,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for summary in summaries:
         log, period = f"log.{summary.log}", f"period.{summary.log}"
         clock = *context.numbers(log, ("rate", "duration"), 5), context.number(f"{log}.jitter", 2)
@@ -161,4 +161,4 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
         samples = context.count(f"{log}.rows")
         rows.append((literal(summary.log), summary.role, summary.format, samples, *clock, *periods))
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
-    return Table("The logs of the study.", header, tuple(rows), "recorded-table", "lllrrrrrr")
+    return Table("The logs of the study.", header, rows, "recorded-table", "lllrrrrrr")

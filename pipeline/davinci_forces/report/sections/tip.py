@@ -7,18 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, TipBudget, TipContact, TipForce
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Equation,
-    Figure,
-    Figure3D,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-)
+from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS
@@ -86,7 +75,7 @@ def correlations(forces: Sequence[TipForce]) -> str:
 
 def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for contact in contacts:
         for i in range(len(contact)):
             prefix = f"tip.{contact.log}.{i + 1}"
@@ -101,7 +90,7 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
         "state, “near singular” a pose in which the force is uncertain."
     )
     header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
-    return Table(caption, header, tuple(rows), "tip-contacts", "llrrrrrl")
+    return Table(caption, header, rows, "tip-contacts", "llrrrrrl")
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
-from davinci_forces.report.content import Block, Cell, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
@@ -43,7 +43,7 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for weight in weights:
         stated, side = str(Number(weight.stated_mass, "kg")), SIDES.get(weight.side, weight.side)
         numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
@@ -54,12 +54,12 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
     header = ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side")
-    return Table(caption, header, tuple(rows), "weight-table", "llrrrrl")
+    return Table(caption, header, rows, "weight-table", "llrrrrl")
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
     """The torque constants that known masses give, beside those that are used."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for constant in constants:
         stated, used = Number(constant.stated_mass, "kg"), Number(constant.torque_constant_used, "N m/A")
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
@@ -70,7 +70,7 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         "gear ratio. Joints whose current shows the mass too imprecisely are left out."
     )
     header = ("Log", "Joint", "Known mass", "Used", "Proposed")
-    return Table(caption, header, tuple(rows), "torque-constants", "llrrr")
+    return Table(caption, header, rows, "torque-constants", "llrrr")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
@@ -159,9 +159,7 @@ def by_joint(context: Context, weight: Weight) -> Table:
 
 def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Table:
     """The apparent mass in free motion, one row a log."""
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free
-    )
+    rows = [(literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free]
     caption = (
         f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
         "logs are predicted by fits without these logs. Apparent masses beyond their errors widen all standard "
