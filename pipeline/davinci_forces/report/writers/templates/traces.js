@@ -13,22 +13,18 @@ class Panel {
       const data = Object.fromEntries(Object.entries(mark.columns).map(([field, place]) => [field, columns[place]]));
       return { ...mark, data, sorted: data.x ? isSorted(data.x) : false, hidden: false };
     });
-    this.element = newElement("div", "", { class: "panel" });
-    this.element.append(this.heading());
-    this.area = newElement("div", "", { class: "area" });
+    const label = [panel.title, panel.y_label].filter(Boolean).join(", ") || "traces";
     this.picture = newElement("canvas");
-    this.cursor = newElement("canvas");
-    this.cursor.setAttribute("role", "img");
-    this.cursor.setAttribute("aria-label", [panel.title, panel.y_label].filter(Boolean).join(", ") || "traces");
+    this.cursor = newElement("canvas", "", { role: "img", "aria-label": label });
+    this.area = newElement("div", "", { class: "area" });
     this.area.append(this.picture, this.cursor);
-    this.element.append(this.area);
+    this.element = newElement("div", "", { class: "panel" });
+    this.element.append(this.heading(), this.area);
   }
 
   heading() {
     const heading = newElement("div", "", { class: "legend" });
-    const title = newElement("b");
-    title.textContent = this.title;
-    if (this.title) heading.append(title);
+    if (this.title) heading.append(newElement("b", this.title));
     for (const mark of this.marks.filter((one) => one.label)) {
       const entry = newButton(mark.label, "", () => {
         mark.hidden = !mark.hidden;
@@ -47,8 +43,8 @@ class Panel {
   range(axis) {
     const columns = this.marks.filter((mark) => MARKS[mark.kind]?.[axis]).flatMap((mark) => MARKS[mark.kind][axis](mark));
     const log = this[`${axis}_log`];
-    const [low, high] = extent(log ? columns.map((column) => column.filter((value) => value > 0)) : columns);
-    return this[`${axis}_range`] ?? widen([low, high], axis === "x" ? 0.01 : 0.06, log);
+    const range = extent(log ? columns.map((column) => column.filter((value) => value > 0)) : columns);
+    return this[`${axis}_range`] ?? widen(range, axis === "x" ? 0.01 : 0.06, log);
   }
 
   draw() {
