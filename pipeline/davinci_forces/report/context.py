@@ -47,9 +47,9 @@ class Context:
         """The results `<prefix>.<name>` as cells."""
         return tuple(self.number(f"{prefix}.{name}", digits) for name in names)
 
-    def probability(self, key: str) -> Number | str:
-        """A probability as a cell; small ones are printed as < 0.001."""
-        return self.number(key, 2, least=0.001)
+    def probabilities(self, prefix: str, names: Iterable[str]) -> tuple[Number | str, ...]:
+        """The probabilities `<prefix>.<name>` as cells; small ones are printed as < 0.001."""
+        return tuple(self.number(f"{prefix}.{name}", 2, least=0.001) for name in names)
 
     def count(self, key: str) -> Number | str:
         """The result of that key, which is a whole number, as a cell."""

@@ -76,7 +76,13 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     """The content about one log."""
     if weight.tare:
-        yield disagreement(context, weight)
+        apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
+        yield Prose(
+            f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to "
+            f"the model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ "
+            "by this amount. The error of the model repeats along the path and cancels, so the standard error does not "
+            "include it. A change between the two runs remains in the estimated mass."
+        )
     loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
     if loads := [load for load in loads if load.joint in weight.loaded]:
         yield figure(weight, loads)
@@ -100,17 +106,6 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
-
-
-def disagreement(context: Context, weight: Weight) -> Prose:
-    """State the apparent mass of the tare according to the model alone."""
-    apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
-    return Prose(
-        f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to the "
-        f"model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ by this "
-        "amount. The error of the model repeats along the path and cancels, so the standard error does not include it. "
-        "A change between the two runs remains in the estimated mass."
-    )
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
@@ -141,9 +136,7 @@ def by_joint(context: Context, weight: Weight) -> Table:
     """The mass estimated from each joint alone."""
     names = ("mass", "mass_mirrored", "false_mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
-    agree, mirrored = (
-        context.probability(f"weight.{weight.log}.{name}") for name in ("agreement", "agreement_mirrored")
-    )
+    agree, mirrored = context.probabilities(f"weight.{weight.log}", ("agreement", "agreement_mirrored"))
     together = (
         f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
     )
