@@ -43,7 +43,11 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     if contacts:
         yield contact_table(context, list(contacts.values()))
     yield level_table(context, forces)
-    yield from narrow(forces)
+    for force in forces:
+        if band(force.force_coverage) == "bad":
+            covers = f"it covers {percent(force.force_coverage)} of samples in free space"
+            text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
+            yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
     budgets = {budget.log: budget for budget in context.catalogue.records(TipBudget)}
     first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
     yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
@@ -108,15 +112,6 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     )
     header = ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular")
     return Table(caption, header, rows, "tip-levels", "llrrrrrr")
-
-
-def narrow(forces: Sequence[TipForce]) -> Iterator[Verdict]:
-    """Logs whose band is too narrow."""
-    for force in forces:
-        if band(force.force_coverage) == "bad":
-            covers = f"it covers {percent(force.force_coverage)} of samples in free space"
-            text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
-            yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
 
 
 def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | None) -> Iterator[Block]:
