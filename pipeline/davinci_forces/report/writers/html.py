@@ -56,11 +56,9 @@ def render(document: Document) -> bytes:
     kept = {f"numbers {name}": numbers_json(figure) for name, figure in still.items()}
     text = _fill(page, [*figures])
     room = LARGEST - len(text.encode()) - sum(map(len, kept.values()))
-    limit = max(FEWEST_POINTS, min(MOST_POINTS, room // POINT_BYTES // max(len(zooms), 1)))
-    for name, figure in zooms.items():
-        trace = thin_figure(figure, limit)
+    for name, trace in _thin_figures(zooms, room).items():
         kept[f"numbers {name}"] = numbers_json(trace)
-        kept[f"note {name}"] = thinning_note(figure.samples, trace.samples)
+        kept[f"note {name}"] = thinning_note(zooms[name].samples, trace.samples)
     parts = text.split(SIGN)
     parts[1::2] = [
         kept.get(part, "") for part in parts[1::2]
@@ -72,6 +70,13 @@ def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
     """The data URL of a figure's picture; that of a trace on screen only has few points."""
     is_replaced = on_screen_only and isinstance(figure, Figure) and figure.zoomable
     return address(shrink(svg(thin_figure(figure, FOLDED_POINTS) if is_replaced else figure)))
+
+
+def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
+    """Each zoomable figure in as many points as the file has room for."""
+    share = room // POINT_BYTES // max(len(zooms), 1)
+    limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
+    return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
 
 
 def _json(value: Any) -> str:
