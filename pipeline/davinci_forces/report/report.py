@@ -113,12 +113,7 @@ def digest(context: Context) -> bytes:
 def _joint(context: Context, joint: str) -> dict[str, Any]:
     """The verdict on one joint as on page one, and the keys of its numbers."""
     trusted = trust(context, joint)
-    p, space = trusted.prediction, trusted.space
-    free = space.prefix if space is not None else ""
-    keys = {
-        "model_error": f"{p.prefix}.model_error" if p is not None else "",
-        "detection_level": f"{free}.detection_level",
-        "coverage": f"{free}.coverage",
-    }
-    result_keys = {name: key if key in context.results else None for name, key in keys.items()}
+    sources = {"model_error": trusted.prediction, "detection_level": trusted.space, "coverage": trusted.space}
+    keys = {name: f"{source.prefix}.{name}" for name, source in sources.items() if source is not None}
+    result_keys = {name: keys[name] if keys.get(name) in context.results else None for name in sources}
     return {"joint": joint, "verdict": trusted.level, "same_path": trusted.same_path, **result_keys}

@@ -162,25 +162,17 @@ class Plot {
     this.whole = this.panels[0].x_range ?? extent(this.panels.map((panel) => panel.range("x")));
     this.log = this.panels[0].x_log;
     this.view = this.whole;
-    this.addTools(toolsOf(figure));
-  }
-
-  get left() {
-    return this.element.clientWidth < 500 ? 56 : 72;
-  }
-
-  get zoomed() {
-    return this.view !== this.whole || this.panels.some((panel) => panel.zoom);
-  }
-
-  addTools(tools) {
-    tools.prepend(
+    toolsOf(figure).prepend(
       newButton("‹", "Earlier", () => this.move(-0.5)),
       newButton("›", "Later", () => this.move(0.5)),
       newButton("−", "Zoom out", () => this.scale(2)),
       newButton("+", "Zoom in", () => this.scale(0.5)),
       newButton("All", "Show all", () => this.reset()),
     );
+  }
+
+  get left() {
+    return this.element.clientWidth < 500 ? 56 : 72;
   }
 
   draw() {
@@ -234,7 +226,8 @@ class Plot {
     });
     cursor.addEventListener("pointermove", (event) => {
       const now = place(event);
-      if (event.pointerType === "touch" && start && this.zoomed) {
+      const isZoomed = this.view !== this.whole || this.panels.some((one) => one.zoom);
+      if (event.pointerType === "touch" && start && isZoomed) {
         const scale = newScale(start.view, this.log, panel.frame.left, panel.frame.right);
         this.show([panel.frame.left, panel.frame.right].map((edge) => scale.from(edge + start.x - now.x)));
       }
