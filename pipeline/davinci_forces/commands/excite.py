@@ -123,9 +123,8 @@ def _format_text(answered: "Answer") -> str:
         lines += _lines(e)
     if held:
         pose = f"hold {', '.join(held)} where they are in the logs to be evaluated"
-        lines += [
-            f"  {pose}: the model of {trajectories[0].joint.name} alone holds in that pose; `all` moves them, too"
-        ]
+        alone = f"the model of {trajectories[0].joint.name} alone holds in that pose"
+        lines.append(f"  {pose}: {alone}; `all` moves them, too")
     return "\n".join(lines)
 
 

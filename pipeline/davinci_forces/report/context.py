@@ -19,7 +19,7 @@ from davinci_forces.study.review import Rating
 
 BASELINE_FIT = "independent.lse"  # each joint by itself, least squares: other fits are compared with this fit
 THESIS_SCENARIOS = ("davinci-demo", "davinci-thesis")  # simulations of the thesis's experiments
-ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
+ESTIMATOR_NAMES = {name: name.upper() for name in ("lse", "wlse", "pso", "iv", "tls")} | {"huber": "Huber"}
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,7 @@ def fit_name(model: str, estimator: str) -> str:
 
 def estimator_name(estimator: str) -> str:
     """The printed name of an estimator: acronyms in capitals, and 'Huber'."""
-    if estimator in ACRONYMS:
-        return estimator.upper()
-    return "Huber" if estimator == "huber" else estimator
+    return ESTIMATOR_NAMES.get(estimator, estimator)
 
 
 def count(number: int, noun: str) -> str:

@@ -98,15 +98,10 @@ def align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def digest(context: Context) -> bytes:
     """The content of summary.json; each value is a key of results.json, or null if there is no such number."""
-    started = [s.started for s in context.catalogue.records(LogSummary) if s.started]
-    study = context.study
-    content = {
-        "title": study.title,
-        "robot": study.robot.name,
-        "simulated": study.simulated,
-        "started": min(started, default=""),
-        "joints": [_joint(context, joint) for joint in fitted_joints(context)],
-    }
+    study, summaries = context.study, context.catalogue.records(LogSummary)
+    started = min((summary.started for summary in summaries if summary.started), default="")
+    about = {"title": study.title, "robot": study.robot.name, "simulated": study.simulated, "started": started}
+    content = about | {"joints": [_joint(context, joint) for joint in fitted_joints(context)]}
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 
