@@ -113,16 +113,18 @@ def _format_text(answered: "Answer") -> str:
     trajectories, arm, held = answered
     lines = []
     if arm:
-        base = f"{arm.base_parameters} base parameters"
+        base, limits = f"{arm.base_parameters} base parameters", arm.limits
+        effort = "within the effort limits" if limits.limits_effort else "efforts not limited (no limit, or no masses)"
+        workspace = "within the workspace" if limits.obstacles.present else "no workspace stated"
         lines += [f"all joints: objective {arm.objective:.4f}, condition {arm.condition:.1f}, {base}"]
-        lines += [_spread(_totals(arm)["starts"]), f"  {_checked(arm)}", *_error_lines(arm.standard_errors)]
+        lines += [_spread(_totals(arm)["starts"]), f"  {effort}; {workspace}; not checked for collisions"]
+        lines += _error_lines(arm.standard_errors)
     for e in trajectories:
         lines += _lines(e)
     if held:
         pose = f"hold {', '.join(held)} where they are in the logs to be evaluated"
-        lines += [
-            f"  {pose}: the model of {trajectories[0].joint.name} alone holds in that pose; `all` moves them, too"
-        ]
+        alone = f"the model of {trajectories[0].joint.name} alone holds in that pose"
+        lines.append(f"  {pose}: {alone}; `all` moves them, too")
     return "\n".join(lines)
 
 
@@ -139,14 +141,6 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
         if not all(map(math.isfinite, of_joint)) and limits in (of_joint, WHOLE_TURN):
             lines[-1] += f": CHECK that the joint may move so, as no limit of {symbol} is stated; --{symbol} sets one"
     return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations] + _error_lines(e.standard_errors)
-
-
-def _checked(arm: "ArmExcitation") -> str:
-    """Which limits of the whole arm hold."""
-    limits = arm.limits
-    effort = "within the effort limits" if limits.limits_effort else "efforts not limited (no limit, or no masses)"
-    workspace = "within the workspace" if limits.obstacles.present else "no workspace stated"
-    return f"{effort}; {workspace}; not checked for collisions"
 
 
 def _error_lines(parameters: "Sequence[ExpectedParameter]") -> list[str]:

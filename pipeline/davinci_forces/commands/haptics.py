@@ -75,7 +75,6 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
 
 def _write_csv(file: Path, run: "HapticRun") -> None:
     """Write the motion and force of one hand, one row per step of the controller."""
-
     columns = run.t, run.plan_x, run.hand_x, run.arm_x, run.true_force, run.felt_force
     rows = zip(*(column.tolist() for column in columns), strict=True)
     names = "t [s],plan [m],hand [m],arm [m],true [N],felt [N]"
@@ -90,10 +89,8 @@ def _format_text(answer: Answer) -> str:
     for row in answer["response"]:
         lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"]
     for name, hand in answer["hands"].items():
-        lines += [
-            "",
-            f"Hand {name!r} of m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m:",
-        ]
+        of_hand = f"m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m"
+        lines += ["", f"Hand {name!r} of {of_hand}:"]
         if hand["out_of_reach"] is not None:
             lines += [f"  unstable: the hand is thrown out of the device's reach after {hand['out_of_reach']:.1f} s"]
         lines += [

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -116,7 +117,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "remote_centre": kinematics.remote_centre(chain).tolist(),
         "jacobian_v": J_v.tolist(), "jacobian_w": J_w.tolist(), **_dynamics(robot, pose, rates),
         "condition": float(tip_force.condition(J_v[..., : tip_force.ARM])) if has_force and not singular else None,
-        "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []), "joints": _joints(robot),
+        "warnings": [*_outside(robot, q), *([_singular(chain, q)] if singular else [])], "joints": _joints(robot),
     }  # fmt: skip
 
 
@@ -149,14 +150,12 @@ def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
     }
 
 
-def _outside(robot: "Robot", q: list[float]) -> list[str]:
+def _outside(robot: "Robot", q: list[float]) -> Iterator[str]:
     """Warn of joints outside their limits; the quantities are computed all the same."""
-    warnings = []
     for joint, value in zip(robot.joints, q, strict=False):
         (low, high), unit = joint.limits.q, joint.unit("{position}")
         if not low <= value <= high:
-            warnings.append(f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}")
-    return warnings
+            yield f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}"
 
 
 def _singular(chain: Any, q: list[float]) -> str:
@@ -199,14 +198,12 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
 
 
-def _joint_lines(robot: "Robot") -> list[str]:
+def _joint_lines(robot: "Robot") -> Iterator[str]:
     """One line per joint: its range, speed, and the terms of its effort."""
     width = max(len(joint.name) for joint in robot.joints)
-    lines = []
     for joint in robot.joints:
         terms = " + ".join(term.name for term in joint.terms)
-        lines.append(f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}")
-    return lines
+        yield f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}"
 
 
 def _moves(joint: "Joint") -> str:

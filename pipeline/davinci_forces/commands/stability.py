@@ -88,8 +88,7 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     tried = now + np.linspace(0.0, 2.0 * np.pi / hand.frequency, TRIED_DELAYS)
     best = max(tried.tolist(), key=lambda late: delay_limit(hand, late + hold))
     at_now, at_best = (sampled_limit(hand, d, rate) if rate else delay_limit(hand, d) for d in (now, best))
-    limits |= {"k_t_delay": at_now, "best_delay": best, "k_t_best": at_best}
-    return limits
+    return limits | {"k_t_delay": at_now, "best_delay": best, "k_t_best": at_best}
 
 
 def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float | None) -> str:

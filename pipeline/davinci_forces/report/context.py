@@ -19,7 +19,7 @@ from davinci_forces.study.review import Rating
 
 BASELINE_FIT = "independent.lse"  # each joint by itself, least squares: other fits are compared with this fit
 THESIS_SCENARIOS = ("davinci-demo", "davinci-thesis")  # simulations of the thesis's experiments
-ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
+ESTIMATOR_NAMES = {name: name.upper() for name in ("lse", "wlse", "pso", "iv", "tls")} | {"huber": "Huber"}
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Context:
         """The results `<prefix>.<name>` as cells."""
         return tuple(self.number(f"{prefix}.{name}", digits) for name in names)
 
-    def probability(self, key: str) -> Number | str:
-        """A probability as a cell; small ones are printed as < 0.001."""
-        return self.number(key, 2, least=0.001)
+    def probabilities(self, prefix: str, names: Iterable[str]) -> tuple[Number | str, ...]:
+        """The probabilities `<prefix>.<name>` as cells; small ones are printed as < 0.001."""
+        return tuple(self.number(f"{prefix}.{name}", 2, least=0.001) for name in names)
 
     def count(self, key: str) -> Number | str:
         """The result of that key, which is a whole number, as a cell."""
@@ -131,9 +131,7 @@ def fit_name(model: str, estimator: str) -> str:
 
 def estimator_name(estimator: str) -> str:
     """The printed name of an estimator: acronyms in capitals, and 'Huber'."""
-    if estimator in ACRONYMS:
-        return estimator.upper()
-    return "Huber" if estimator == "huber" else estimator
+    return ESTIMATOR_NAMES.get(estimator, estimator)
 
 
 def count(number: int, noun: str) -> str:

@@ -98,27 +98,17 @@ def align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def digest(context: Context) -> bytes:
     """The content of summary.json; each value is a key of results.json, or null if there is no such number."""
-    started = [s.started for s in context.catalogue.records(LogSummary) if s.started]
-    study = context.study
-    content = {
-        "title": study.title,
-        "robot": study.robot.name,
-        "simulated": study.simulated,
-        "started": min(started, default=""),
-        "joints": [_joint(context, joint) for joint in fitted_joints(context)],
-    }
+    study, summaries = context.study, context.catalogue.records(LogSummary)
+    started = min((summary.started for summary in summaries if summary.started), default="")
+    about = {"title": study.title, "robot": study.robot.name, "simulated": study.simulated, "started": started}
+    content = about | {"joints": [_joint(context, joint) for joint in fitted_joints(context)]}
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def _joint(context: Context, joint: str) -> dict[str, Any]:
     """The verdict on one joint as on page one, and the keys of its numbers."""
     trusted = trust(context, joint)
-    p, space = trusted.prediction, trusted.space
-    free = space.prefix if space is not None else ""
-    keys = {
-        "model_error": f"{p.prefix}.model_error" if p is not None else "",
-        "detection_level": f"{free}.detection_level",
-        "coverage": f"{free}.coverage",
-    }
-    result_keys = {name: key if key in context.results else None for name, key in keys.items()}
+    sources = {"model_error": trusted.prediction, "detection_level": trusted.space, "coverage": trusted.space}
+    keys = {name: f"{source.prefix}.{name}" for name, source in sources.items() if source is not None}
+    result_keys = {name: keys[name] if keys.get(name) in context.results else None for name in sources}
     return {"joint": joint, "verdict": trusted.level, "same_path": trusted.same_path, **result_keys}

@@ -133,8 +133,7 @@ def table(
     for study in (study for study in studies if joint in study.joints):
         numbers = (cell(study, keys.get((name, study.name))) for name in names)
         rows.append((date(study), study.link, *([word(study, joint)] if verdict else []), *numbers))
-    heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
-    header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
+    header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(title, names))
     align = ("lll" if verdict else "ll") + "r" * len(names)
     return Table(f"{title(joint)}: {content}, in every study.", header, tuple(rows), f"campaign-{label}", align)
 

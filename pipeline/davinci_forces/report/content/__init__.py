@@ -7,7 +7,7 @@ Words in figures, listings, and the title and study of a document are shown as t
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, TypeVar
 
@@ -76,12 +76,13 @@ class Table:
 
     caption: str
     header: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: Sequence[tuple[Cell, ...]]
     label: str | None = None
     align: str = ""
     printed: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", tuple(self.rows))
         wrong = [len(row) for row in self.rows if len(row) != len(self.header)]
         if wrong or (self.align and len(self.align) != len(self.header)):
             raise ValueError(

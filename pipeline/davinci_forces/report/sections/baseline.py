@@ -35,7 +35,17 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
         "standard error changes by chance."
     )
     if changed:
-        yield from table(context, changed)
+        rows = [
+            (literal(c.key), literal(_text(c.before)), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
+            for c in changed[:MAX_ROWS]
+            if c.before
+        ]
+        which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")
+        values = "values a and b, and b minus a over its standard error."
+        caption = f"{which} since the baseline, the largest first: {values}"
+        header = ("Number", "a, the baseline", "b, now", "Standard errors")
+        whole = Table(caption, header, rows, "baseline-changes", "lrrr")
+        yield from paper_or_screen(whole, "Changes since the baseline")
     for keys, what, anchor in ((came, "new", "baseline-came"), (went, "missing", "baseline-went")):
         if keys:
             more = [f"and {len(keys) - MAX_ROWS} more"] if len(keys) > MAX_ROWS else []
@@ -43,22 +53,7 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
             yield OnScreen(f"{count(len(keys), what + ' key')}", anchor, (listed,))
 
 
-def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
-    """The changes, the largest first; on screen if they are many."""
-    rows = tuple(
-        (literal(c.key), before_text(c), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
-        for c in changed[:MAX_ROWS]
-    )
-    which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")
-    caption = f"{which} since the baseline, the largest first: values a and b, and b minus a over its standard error."
-    header = ("Number", "a, the baseline", "b, now", "Standard errors")
-    whole = Table(caption, header, rows, "baseline-changes", "lrrr")
-    yield from paper_or_screen(whole, "Changes since the baseline")
-
-
-def before_text(change: Change) -> str:
-    """A number of the baseline as it is printed."""
-    stated = change.before
-    assert stated
-    shown = str(stated.value) if stated.number is None else Number(stated.number, format_unit(stated.unit), stated.std)
-    return literal(str(shown))
+def _text(stated: StatedValue) -> str:
+    if stated.number is None:
+        return str(stated.value)
+    return str(Number(stated.number, format_unit(stated.unit), stated.std))

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.records import Choice, ModelSearch, Prediction
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import paper_or_screen, run_cells, section_of
@@ -88,14 +88,14 @@ def table(context: Context, choice: Choice, rows: list[int], caption: str, label
         " Relative errors: on blocks of path left out (raw samples), on the fitted data, and on periods left out. "
         "Physical: whether the inertia is positive definite along the trajectories."
     )
-    cells: list[tuple[Cell, ...]] = []
+    cells = []
     for i in rows:
         name, physical = str(choice.candidate[i]), "yes" if choice.physical[i] else "no"
         key = f"choice.{choice.group}.{slug(name)}"
         scores = context.numbers(key, ("score", "training", "over_periods"))
         named = f"**{literal(name)}**" if name == choice.chosen else literal(name)
         cells.append((named, context.count(f"{key}.parameters"), *scores, physical))
-    return Table(caption, header, tuple(cells), label, "lrrrrl")
+    return Table(caption, header, cells, label, "lrrrrl")
 
 
 def figure(choice: Choice) -> Figure:

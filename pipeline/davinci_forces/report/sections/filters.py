@@ -56,16 +56,14 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     """The tuned noise of each joint, and the logs of the tuning."""
-    rows: list[tuple[Cell, ...]] = []
-    for noise in noises:
-        numbers = context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau"))
-        rows.append((title(noise.joint), *numbers, literal(", ".join(noise.logs))))
+    names = ("r_q", "r_dq", "r_tau", "q_tau")
+    rows = [(title(n.joint), *context.numbers(f"tuning.{n.joint}", names), literal(", ".join(n.logs))) for n in noises]
     caption = (
         "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
         "per square root of a second."
     )
     header = ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on")
-    return Table(caption, header, tuple(rows), "filter-tuning", "lrrrrl")
+    return Table(caption, header, rows, "filter-tuning", "lrrrrl")
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
@@ -119,13 +117,13 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         "once in ten minutes. Contacts found: the number of measured contacts that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
-    return Table(caption, header, tuple(rows), "stream", "llrrrrrr")
+    return Table(caption, header, rows, "stream", "llrrrrrr")
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst run in free space of each joint."""
     names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for c in compared:
         numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
         rows.append((title(c.joint), name_of(c.filter), *numbers))
@@ -135,7 +133,7 @@ def comparison(context: Context, compared: list[Comparison]) -> Table:
         "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
     )
     header = ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay")
-    return Table(caption, header, tuple(rows), "filter-comparison", "llrrrr")
+    return Table(caption, header, rows, "filter-comparison", "llrrrr")
 
 
 def name_of(label: str) -> str:

@@ -183,7 +183,7 @@ def errors_in_deviations(contact: TipContact, i: int, push: Push) -> list[float]
 
 def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Table:
     """One row a push."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for contact, i, push in pairs:
         true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
         numbers = context.numbers(f"tip.{contact.log}.{i + 1}", COMPONENTS)
@@ -194,7 +194,7 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
         "standard deviations. The true force is the peak of the push; the estimate can peak at another instant."
     )
     header = ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error")
-    return Table(caption, header, tuple(rows), "tip-truth", "llrrrrrrr")
+    return Table(caption, header, rows, "tip-truth", "llrrrrrrr")
 
 
 def truth_verdict(name: str, errors: list[float]) -> Verdict:

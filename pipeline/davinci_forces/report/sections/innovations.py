@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import AnyMark, HBand, Line
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
@@ -81,7 +81,12 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
 
 def tests(context: Context, explained: list[Explanation]) -> Table:
     """Every test of every run."""
-    rows = tuple((*run_cells(e), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
+    rows = []
+    for e in explained:
+        key = f"ekf.{e.log}.{e.joint}"
+        numbers = context.numbers(key, ("nis_mean", "acf1_q", "acf1_dq"), 2)
+        white = context.probabilities(key, ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq"))
+        rows.append((*run_cells(e), *numbers, *white, context.number(f"{key}.clock_std", 2)))
     caption = (
         "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
         "autocorrelations (ACF); p-values of the Ljung-Box test and of the cumulative periodogram for white noise. "
@@ -89,16 +94,6 @@ def tests(context: Context, explained: list[Explanation]) -> Table:
     )
     by_signal = (f"{test}, ${x}$" for test in ("ACF(1)", "Ljung-Box", "Periodogram") for x in ("q", "dot(q)"))
     return Table(caption, ("Log", "Joint", "NIS", *by_signal, "Times"), rows, "innovation-table", "llrrrrrrrr")
-
-
-def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
-    """The numbers of one run's innovations."""
-    probabilities = ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq")
-    return (
-        *context.numbers(prefix, ("nis_mean", "acf1_q", "acf1_dq"), 2),
-        *(context.probability(f"{prefix}.{name}") for name in probabilities),
-        context.number(f"{prefix}.clock_std", 2),
-    )
 
 
 def trials(e: Explanation) -> Table:

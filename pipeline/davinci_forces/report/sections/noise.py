@@ -1,11 +1,12 @@
 """The noise of position, velocity and effort, from the spread between periods.  (6.3.3)"""
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
 from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.marks import Bars, Histogram, Line, Points
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_cells, run_name, section_of
@@ -23,7 +24,7 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
         "joints' motion repeats; remarks on the recordings name the samples outside this interval."
     )
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for a in averages:
         key, period = f"noise.{a.log}.{a.joint}", context.number(f"period.{a.log}", 6)
         share = context.number(f"{key}.relative_noise", 2, std=None)
@@ -33,7 +34,7 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
         "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
         "repeat, over the RMS effort. It is part of every relative error, as no model can remove it."
     )
-    yield Table(caption, header, tuple(rows), "noise-table", "llrrrrr")
+    yield Table(caption, header, rows, "noise-table", "llrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)
@@ -49,26 +50,18 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
 def tests(context: Context, averages: list[Average]) -> Table:
     """Whether the noise is white and normal, signal by signal."""
     header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Excess kurtosis")
-    rows = tuple(
-        (*run_cells(a), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
-        for a in averages
-        for signal, meaning in NOISE_FIELDS.items()
-    )
+    rows = []
+    for a, (signal, meaning) in product(averages, NOISE_FIELDS.items()):
+        key = f"whiteness.{a.log}.{a.joint}.{signal}"
+        tested = context.probabilities(key, ("ljung_box_p", "jarque_bera_p"))
+        acf, *shape = context.numbers(key, ("acf1", "skewness", "kurtosis"), 2)
+        rows.append((*run_cells(a), meaning, acf, *tested, *shape))
     caption = (
         "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the p-values of the "
         "Ljung-Box test (white) and of the Jarque-Bera test (normal). A p-value below 0.01 means no. Real encoders, "
         "their derivative and a jittering clock give coloured noise (not white); the filter assumes white noise."
     )
     return Table(caption, header, rows, "noise-tests", "lllrrrrr")
-
-
-def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
-    """The tests of one signal."""
-    return (
-        context.number(f"{prefix}.acf1", 2),
-        *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p", "jarque_bera_p")),
-        *context.numbers(prefix, ("skewness", "kurtosis"), 2),
-    )
 
 
 def outliers(context: Context, average: Average) -> Iterator[Verdict]:
@@ -141,9 +134,8 @@ def one_period(average: Average, signal: Signal) -> Panel:
 def spectrum(s: Spectrum) -> Panel:
     """The spectrum of the position, and the harmonics that are kept of it.  Fig 6.8"""
     shown = slice(0, min(len(s.amplitude), max(4 * s.harmonics, 20)))
-    harmonic = np.arange(len(s.amplitude)) <= s.harmonics
     f, a = s.frequency[shown], np.maximum(s.amplitude[shown], 1e-12)
-    k = harmonic[shown]
+    k = np.arange(len(a)) <= s.harmonics
     marks = (Points(f[k], a[k], "kept", "blue"), Points(f[~k], a[~k], "taken as noise", "grey"))
     return Panel("Spectrum of the position", "frequency [Hz]", label(s, "amplitude", "amplitude"), marks, y_log=True)
 

@@ -26,7 +26,18 @@ def section(context: Context) -> Iterator[Block]:
 
 def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
-    yield from intro(context, tracks)
+    tuned = ", tuned as in [@filter-tuning]" if context.catalogue.records(FilterNoise) else ""
+    tested = " Its innovations test whether it fits the data ([@innovations])."
+    yield Prose(
+        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}. "
+        "External efforts are those of its smoother, which uses the whole recording and has no delay."
+        + (tested if context.catalogue.records(Explanation) else "")
+    )
+    if at_rest := [parts.run_name(t.log, t.joint) for t in tracks if t.at_rest]:
+        yield Prose(
+            f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
+            "to its static level, and hides external efforts up to that level."
+        )
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
@@ -39,23 +50,6 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
             for t in others
         )
         yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
-
-
-def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
-    """Describe the filter, and name the joints at rest."""
-    tuned = ", tuned as in [@filter-tuning]" if context.catalogue.records(FilterNoise) else ""
-    tested = " Its innovations test whether it fits the data ([@innovations])."
-    yield Prose(
-        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}. "
-        "External efforts are those of its smoother, which uses the whole recording and has no delay."
-        + (tested if context.catalogue.records(Explanation) else "")
-    )
-    at_rest = [parts.run_name(t.log, t.joint) for t in tracks if t.at_rest]
-    if at_rest:
-        yield Prose(
-            f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
-            "to its static level, and hides external efforts up to that level."
-        )
 
 
 def scores(context: Context, tracks: list[Track]) -> Table:
@@ -153,7 +147,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
 
 def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for summary in summaries:
         log, period = f"log.{summary.log}", f"period.{summary.log}"
         clock = *context.numbers(log, ("rate", "duration"), 5), context.number(f"{log}.jitter", 2)
@@ -161,4 +155,4 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
         samples = context.count(f"{log}.rows")
         rows.append((literal(summary.log), summary.role, summary.format, samples, *clock, *periods))
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
-    return Table("The logs of the study.", header, tuple(rows), "recorded-table", "lllrrrrrr")
+    return Table("The logs of the study.", header, rows, "recorded-table", "lllrrrrrr")

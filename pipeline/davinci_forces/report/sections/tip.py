@@ -7,18 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, TipBudget, TipContact, TipForce
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Equation,
-    Figure,
-    Figure3D,
-    OnScreen,
-    Panel,
-    Prose,
-    Table,
-    Verdict,
-)
+from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS, Number
@@ -54,7 +43,11 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     if contacts:
         yield contact_table(context, list(contacts.values()))
     yield level_table(context, forces)
-    yield from narrow(forces)
+    for force in forces:
+        if band(force.force_coverage) == "bad":
+            covers = f"it covers {percent(force.force_coverage)} of samples in free space"
+            text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
+            yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
     budgets = {budget.log: budget for budget in context.catalogue.records(TipBudget)}
     first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
     yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
@@ -86,7 +79,7 @@ def correlations(forces: Sequence[TipForce]) -> str:
 
 def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for contact in contacts:
         for i in range(len(contact)):
             prefix = f"tip.{contact.log}.{i + 1}"
@@ -101,7 +94,7 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
         "state, “near singular” a pose in which the force is uncertain."
     )
     header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
-    return Table(caption, header, tuple(rows), "tip-contacts", "llrrrrrl")
+    return Table(caption, header, rows, "tip-contacts", "llrrrrrl")
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
@@ -119,15 +112,6 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     )
     header = ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular")
     return Table(caption, header, rows, "tip-levels", "llrrrrrr")
-
-
-def narrow(forces: Sequence[TipForce]) -> Iterator[Verdict]:
-    """Logs whose band is too narrow."""
-    for force in forces:
-        if band(force.force_coverage) == "bad":
-            covers = f"it covers {percent(force.force_coverage)} of samples in free space"
-            text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
-            yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
 
 
 def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | None) -> Iterator[Block]:

@@ -106,12 +106,14 @@ def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Fi
     name = literal(tissue.log)
     many = len(tissue) > MAX_PUSHES_LISTED
     last = spread_panel(tissue) if many else hysteresis_panel(typical)
+    misfit = typical.force - typical.intercept - typical.k_t * typical.depth
+    residual = Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(typical, misfit)))
     third = "the distribution of the stiffness of pushes" if many else "its force on the way in and out (hysteresis)"
     return Figure(
         f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
         f"residual of the line; and {third}. The stiffness of this push is nearest to that of the log.",
         f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}.",
-        (line_panel(pushes, typical), residual_panel(typical), last),
+        (line_panel(pushes, typical), residual, last),
         f"tissue-{tissue.log}",
         columns=3,
         height=46,
@@ -131,12 +133,6 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
     wide = NORMAL_95 * typical.k_t_std * np.abs(x - depth.mean())
     marks += [Band(MM * x, y - wide, y + wide, "95 %", "vermillion"), Line(MM * x, y, "line", "black", "solid")]
     return Panel("Force against depth", "depth [mm]", "force [N]", tuple(marks))
-
-
-def residual_panel(push: Push) -> Panel:
-    """The residual of the straight line of one push."""
-    residual = push.force - push.intercept - push.k_t * push.depth
-    return Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(push, residual)))
 
 
 def hysteresis_panel(push: Push) -> Panel:

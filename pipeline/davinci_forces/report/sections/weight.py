@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
-from davinci_forces.report.content import Block, Cell, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
@@ -43,7 +43,7 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for weight in weights:
         stated, side = str(Number(weight.stated_mass, "kg")), SIDES.get(weight.side, weight.side)
         numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
@@ -54,12 +54,12 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         "two standard errors. The scale is the estimated mass divided by the stated mass."
     )
     header = ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side")
-    return Table(caption, header, tuple(rows), "weight-table", "llrrrrl")
+    return Table(caption, header, rows, "weight-table", "llrrrrl")
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
     """The torque constants that known masses give, beside those that are used."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for constant in constants:
         stated, used = Number(constant.stated_mass, "kg"), Number(constant.torque_constant_used, "N m/A")
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
@@ -71,13 +71,19 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         "the mass too imprecisely are left out."
     )
     header = ("Log", "Joint", "Known mass", "Used", "Proposed")
-    return Table(caption, header, tuple(rows), "torque-constants", "llrrr")
+    return Table(caption, header, rows, "torque-constants", "llrrr")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     """The content about one log."""
     if weight.tare:
-        yield disagreement(context, weight)
+        apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
+        yield Prose(
+            f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to "
+            f"the model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ "
+            "by this amount. The error of the model repeats along the path and cancels, so the standard error does not "
+            "include it. A change between the two runs remains in the estimated mass."
+        )
     loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
     if loads := [load for load in loads if load.joint in weight.loaded]:
         yield figure(weight, loads)
@@ -102,17 +108,6 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
-
-
-def disagreement(context: Context, weight: Weight) -> Prose:
-    """State the apparent mass of the tare according to the model alone."""
-    apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
-    return Prose(
-        f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to the "
-        f"model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ by this "
-        "amount. The error of the model repeats along the path and cancels, so the standard error does not include it. "
-        "A change between the two runs remains in the estimated mass."
-    )
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
@@ -144,9 +139,7 @@ def by_joint(context: Context, weight: Weight) -> Table:
     """The mass estimated from each joint alone."""
     names = ("mass", "mass_mirrored", "false_mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
-    agree, mirrored = (
-        context.probability(f"weight.{weight.log}.{name}") for name in ("agreement", "agreement_mirrored")
-    )
+    agree, mirrored = context.probabilities(f"weight.{weight.log}", ("agreement", "agreement_mirrored"))
     together = (
         f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
     )
@@ -162,9 +155,7 @@ def by_joint(context: Context, weight: Weight) -> Table:
 
 def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Table:
     """The apparent mass in free motion, one row a log."""
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free
-    )
+    rows = [(literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free]
     caption = (
         f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
         "logs are predicted by fits without these logs. Apparent masses beyond their errors widen all standard "

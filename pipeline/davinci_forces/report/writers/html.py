@@ -60,9 +60,7 @@ def render(document: Document) -> bytes:
         kept[f"numbers {name}"] = numbers_json(trace)
         kept[f"note {name}"] = thinning_note(zooms[name].samples, trace.samples)
     parts = text.split(SIGN)
-    parts[1::2] = [
-        kept.get(part, "") for part in parts[1::2]
-    ]  # in place of the signs of `_fill`; still ones have no note
+    parts[1::2] = [kept.get(part, "") for part in parts[1::2]]  # those of `_fill`; still figures have no note
     return "".join(parts).encode()
 
 

@@ -8,25 +8,12 @@ from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import (
-    Block,
-    Bullets,
-    Cell,
-    Equation,
-    Figure,
-    OnScreen,
-    Panel,
-    Prose,
-    Section,
-    Table,
-    Verdict,
-)
+from davinci_forces.report.content import Block, Bullets, Cell, Equation, OnScreen, Prose, Section, Table, Verdict
 from davinci_forces.report.content.inline import literal
-from davinci_forces.report.content.marks import Tiles
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.joints.estimators import convergence, estimators
+from davinci_forces.report.sections.joints.estimators import convergence, correlations, estimators
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name, section_of
@@ -233,25 +220,3 @@ def unidentified_parameters(context: Context, joint: str, is_used: bool) -> Iter
         if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
             text = f"{text[:1].upper()}{text[1:]}" if is_used else f"In the plain model, {text}"
             yield Verdict("info", f"{text}. {record.advice}.")
-
-
-def correlations(context: Context, joint: str) -> Iterator[Block]:
-    """The correlation matrix of a joint's parameters, and the condition number of their regressor."""
-    for record in context.catalogue.select(Identifiability, group=joint):
-        names = tuple(dict.fromkeys(map(str, record.parameter)))
-        number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
-        yield Prose(
-            f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
-            "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
-            "difference of the two parameters is known well."
-        )
-        pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
-        strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
-        numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
-        yield Figure(
-            f"{title(joint)}: correlation of the errors of its parameters (least squares).",
-            f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
-            (Panel("", "", "", (Tiles(record.correlation, numbered),)),),
-            f"correlation-{joint}",
-            height=12.0 + 9.0 * len(names),
-        )

@@ -1,12 +1,12 @@
-"""The estimators of a joint compared with each other."""
+"""The estimators of a joint compared with each other, and how well they tell its parameters apart."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Fit, Residual, SwarmSearch
-from davinci_forces.report.content import Figure, Panel, literal
-from davinci_forces.report.content.marks import Colour, Line
+from davinci_forces.records import Fit, Identifiability, Residual, SwarmSearch
+from davinci_forces.report.content import Block, Figure, Panel, Prose, literal
+from davinci_forces.report.content.marks import Colour, Line, Tiles
 from davinci_forces.report.context import Context, estimator_name, label, title
 
 LOOKS: dict[str, Colour] = {
@@ -82,3 +82,25 @@ def excess_in_words(excess: float) -> str:
     if excess < REACHED:
         return "is reached"
     return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
+
+
+def correlations(context: Context, joint: str) -> Iterator[Block]:
+    """The correlation matrix of a joint's parameters, and the condition number of their regressor."""
+    for record in context.catalogue.select(Identifiability, group=joint):
+        names = tuple(dict.fromkeys(map(str, record.parameter)))
+        number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
+        yield Prose(
+            f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
+            "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
+            "difference of the two parameters is known well."
+        )
+        pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
+        strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
+        numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
+        yield Figure(
+            f"{title(joint)}: correlation of the errors of its parameters (least squares).",
+            f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
+            (Panel("", "", "", (Tiles(record.correlation, numbered),)),),
+            f"correlation-{joint}",
+            height=12.0 + 9.0 * len(names),
+        )

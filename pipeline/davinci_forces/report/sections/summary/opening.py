@@ -105,9 +105,7 @@ def logs_in_words(context: Context) -> str:
     """State what the logs are for, by their roles."""
     roles = [log.role for log in context.study.logs]
     uses = [f"{roles.count(role)} {use}" for role, use in USES.items() if role in roles]
-    *most, last = uses
-    kind = "Simulated logs" if context.study.simulated else "Logs"
-    return f"{kind} of this study: {', '.join(most)} and {last}." if most else f"{kind} of this study: {last}."
+    return f"{'Simulated logs' if context.study.simulated else 'Logs'} of this study: {as_list(uses)}."
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:

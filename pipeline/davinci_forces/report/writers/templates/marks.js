@@ -41,9 +41,9 @@ function visible(mark, frame) {
   return [Math.max(0, reach(x, frame.x.from(frame.left)) - 1), Math.min(x.length, reach(x, frame.x.from(frame.right)) + 1)];
 }
 
-function trace(context, x, y, frame, first, last, step = 1) {
+function trace(context, x, y, frame, first = 0, last = x.length) {
   let down = false;
-  for (let i = first; i !== last; i += step) {
+  for (let i = first; i < last; i++) {
     const [across, up] = [frame.x.to(x[i]), frame.y.to(y[i])];
     if (!Number.isFinite(up) || !Number.isFinite(across)) down = false;
     else if (down) context.lineTo(across, up);
@@ -70,25 +70,29 @@ function fill(context, alpha, draw) {
 
 const box = (context, a, b, c, d) => context.fillRect(Math.min(a, c), Math.min(b, d), Math.abs(c - a), Math.abs(d - b));
 
+const ofX = ({ data }) => [data.x];
+const sayY = (mark, i, print) => print(mark.data.y[i]);
+const endsOfX = (frame) => [frame.x.from(frame.left), frame.x.from(frame.right)];
+
 const MARKS = {
   Line: {
     draw(context, mark, frame) {
       const [first, last] = visible(mark, frame);
       stroke(context, mark, () => trace(context, mark.data.x, mark.data.y, frame, first, last));
     },
-    x: ({ data }) => [data.x],
+    x: ofX,
     y: ({ data }) => [data.y],
-    say: (mark, i, print) => print(mark.data.y[i]),
+    say: sayY,
   },
   Band: {
     draw(context, mark, frame) {
       const { x, lower, upper } = mark.data;
       const [first, last] = visible(mark, frame);
+      const isKnown = (i) => !Number.isNaN(lower[i] + upper[i]);
       fill(context, 0.25, () => {
         for (let i = first; i < last; i++) {
-          if (Number.isNaN(lower[i] + upper[i])) continue;
           const start = i;
-          while (i < last && !Number.isNaN(lower[i] + upper[i])) i++;
+          while (i < last && isKnown(i)) i++;
           context.beginPath();
           for (let k = start; k < i; k++) context.lineTo(frame.x.to(x[k]), frame.y.to(upper[k]));
           for (let k = i - 1; k >= start; k--) context.lineTo(frame.x.to(x[k]), frame.y.to(lower[k]));
@@ -96,7 +100,7 @@ const MARKS = {
         }
       });
     },
-    x: ({ data }) => [data.x],
+    x: ofX,
     y: ({ data }) => [data.lower, data.upper],
     say: (mark, i, print) => `${print(mark.data.lower[i])} to ${print(mark.data.upper[i])}`,
   },
@@ -113,18 +117,18 @@ const MARKS = {
         context.fillText(...words);
       }
     },
-    x: ({ data }) => [data.x],
+    x: ofX,
     y: ({ data: { y, y_std: std } }) => (std ? [y.map((v, i) => v - std[i]), y.map((v, i) => v + std[i])] : [y]),
-    say: (mark, i, print) => print(mark.data.y[i]),
+    say: sayY,
   },
   Stems: {
     draw(context, mark, frame) {
       const { x, y } = mark.data;
       for (let i = 0; i < x.length; i++) box(context, frame.x.to(x[i]) - 0.6, frame.y.to(0), frame.x.to(x[i]) + 0.6, frame.y.to(y[i]));
     },
-    x: ({ data }) => [data.x],
+    x: ofX,
     y: ({ data }) => [data.y, [0]],
-    say: (mark, i, print) => print(mark.data.y[i]),
+    say: sayY,
   },
   Histogram: {
     draw(context, mark, frame) {
@@ -137,12 +141,12 @@ const MARKS = {
   },
   HLine: {
     draw: (context, mark, frame) =>
-      stroke(context, mark, () => trace(context, [frame.x.from(frame.left), frame.x.from(frame.right)], [mark.y, mark.y], frame, 0, 2)),
+      stroke(context, mark, () => trace(context, endsOfX(frame), [mark.y, mark.y], frame)),
     y: (mark) => [[mark.y]],
   },
   VLine: {
     draw: (context, mark, frame) =>
-      stroke(context, mark, () => trace(context, [mark.x, mark.x], [frame.y.from(frame.bottom), frame.y.from(frame.top)], frame, 0, 2)),
+      stroke(context, mark, () => trace(context, [mark.x, mark.x], [frame.y.from(frame.bottom), frame.y.from(frame.top)], frame)),
     x: (mark) => [[mark.x]],
   },
   HBand: {
@@ -157,8 +161,8 @@ const MARKS = {
   },
   Reference: {
     draw(context, mark, frame) {
-      const ends = [frame.x.from(frame.left), frame.x.from(frame.right)];
-      stroke(context, mark, () => trace(context, ends, ends.map((x) => mark.intercept + mark.slope * x), frame, 0, 2));
+      const ends = endsOfX(frame);
+      stroke(context, mark, () => trace(context, ends, ends.map((x) => mark.intercept + mark.slope * x), frame));
     },
   },
 };

@@ -13,22 +13,18 @@ class Panel {
       const data = Object.fromEntries(Object.entries(mark.columns).map(([field, place]) => [field, columns[place]]));
       return { ...mark, data, sorted: data.x ? isSorted(data.x) : false, hidden: false };
     });
-    this.element = newElement("div", "", { class: "panel" });
-    this.element.append(this.heading());
-    this.area = newElement("div", "", { class: "area" });
+    const label = [panel.title, panel.y_label].filter(Boolean).join(", ") || "traces";
     this.picture = newElement("canvas");
-    this.cursor = newElement("canvas");
-    this.cursor.setAttribute("role", "img");
-    this.cursor.setAttribute("aria-label", [panel.title, panel.y_label].filter(Boolean).join(", ") || "traces");
+    this.cursor = newElement("canvas", "", { role: "img", "aria-label": label });
+    this.area = newElement("div", "", { class: "area" });
     this.area.append(this.picture, this.cursor);
-    this.element.append(this.area);
+    this.element = newElement("div", "", { class: "panel" });
+    this.element.append(this.heading(), this.area);
   }
 
   heading() {
     const heading = newElement("div", "", { class: "legend" });
-    const title = newElement("b");
-    title.textContent = this.title;
-    if (this.title) heading.append(title);
+    if (this.title) heading.append(newElement("b", this.title));
     for (const mark of this.marks.filter((one) => one.label)) {
       const entry = newButton(mark.label, "", () => {
         mark.hidden = !mark.hidden;
@@ -47,8 +43,8 @@ class Panel {
   range(axis) {
     const columns = this.marks.filter((mark) => MARKS[mark.kind]?.[axis]).flatMap((mark) => MARKS[mark.kind][axis](mark));
     const log = this[`${axis}_log`];
-    const [low, high] = extent(log ? columns.map((column) => column.filter((value) => value > 0)) : columns);
-    return this[`${axis}_range`] ?? widen([low, high], axis === "x" ? 0.01 : 0.06, log);
+    const range = extent(log ? columns.map((column) => column.filter((value) => value > 0)) : columns);
+    return this[`${axis}_range`] ?? widen(range, axis === "x" ? 0.01 : 0.06, log);
   }
 
   draw() {
@@ -166,25 +162,17 @@ class Plot {
     this.whole = this.panels[0].x_range ?? extent(this.panels.map((panel) => panel.range("x")));
     this.log = this.panels[0].x_log;
     this.view = this.whole;
-    this.addTools(toolsOf(figure));
-  }
-
-  get left() {
-    return this.element.clientWidth < 500 ? 56 : 72;
-  }
-
-  get zoomed() {
-    return this.view !== this.whole || this.panels.some((panel) => panel.zoom);
-  }
-
-  addTools(tools) {
-    tools.prepend(
+    toolsOf(figure).prepend(
       newButton("‹", "Earlier", () => this.move(-0.5)),
       newButton("›", "Later", () => this.move(0.5)),
       newButton("−", "Zoom out", () => this.scale(2)),
       newButton("+", "Zoom in", () => this.scale(0.5)),
       newButton("All", "Show all", () => this.reset()),
     );
+  }
+
+  get left() {
+    return this.element.clientWidth < 500 ? 56 : 72;
   }
 
   draw() {
@@ -238,7 +226,8 @@ class Plot {
     });
     cursor.addEventListener("pointermove", (event) => {
       const now = place(event);
-      if (event.pointerType === "touch" && start && this.zoomed) {
+      const isZoomed = this.view !== this.whole || this.panels.some((one) => one.zoom);
+      if (event.pointerType === "touch" && start && isZoomed) {
         const scale = newScale(start.view, this.log, panel.frame.left, panel.frame.right);
         this.show([panel.frame.left, panel.frame.right].map((edge) => scale.from(edge + start.x - now.x)));
       }
