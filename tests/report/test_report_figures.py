@@ -158,7 +158,8 @@ def test_another_process_gives_the_same_bytes(full: Document) -> None:
         "d = document();"
         "[print(hashlib.sha256(w.render(d)).hexdigest()) for w in (pdf, html)]"
     )
-    path = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])
+    here = Path(__file__).resolve()
+    path = os.pathsep.join(map(str, [here.parent, here.parents[2], here.parents[2] / "pipeline"]))
     environment = os.environ | {"PYTHONHASHSEED": "77", "PYTHONPATH": path}
     result = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment, timeout=120
