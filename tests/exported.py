@@ -75,6 +75,8 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
     """An export of all joints of a robot, as models of this structure with every term."""
     study = SimpleNamespace(name="mine", title='A "title" -- */', robot=robot, simulated=simulated)
     study.settings = SimpleNamespace(lowpass=17.0)
+    measured = SimpleNamespace(joint=robot.joints[0].name, symbol="i")
+    study.logs = [SimpleNamespace(channels=[measured])]
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1.0 / RATE)
     band = {"edges": [0.1, 0.3, 0.6], "factor": [0.9, 1.0, 1.2, 1.4], "model_variance": 0.02}
     Q = [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]]

@@ -208,3 +208,9 @@ def test_the_header_states_the_rate_and_the_period():
     assert "#define DF_RATE 100.0" in header
     assert "#define DF_PERIOD 0.01" in header
     assert "low-pass at 17 Hz" in header
+
+
+def test_the_header_states_what_an_ampere_counts_where_currents_were_measured():
+    header = renderer("c")(export(DAVINCI, "independent")).files["model.h"]
+    assert "hand_roll: 1 A of its motor counts as 8.76 N m" in header  # 200 * 0.0438
+    assert "hand_pitch: 1 A" not in header

@@ -277,8 +277,8 @@ def trusts(full: Context, **shares: float) -> list[Trust]:
 def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Context):
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
     assert said == (
-        "Efforts above 0.070 on the hand roll can be believed; on an unseen path the model errs by 16 % on the "
-        "hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
+        "Efforts above 0.070 on the hand roll stand out from free motion; on an unseen path the model errs by 16 % on "
+        "the hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
         "slide, too much to be believed; in free motion all 95 % bands are wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)

@@ -1,15 +1,18 @@
 """From where on a verdict of the report is good, cautious or bad."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from report_records import free_space, prediction, stiffness, weight
 
 from davinci_forces.maths.periods.shift import SAME_PATH
-from davinci_forces.records import PathShare, TorqueConstant
+from davinci_forces.records import PathShare, TorqueConstant, Weight
+from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report import verdicts
 from davinci_forces.report.context import name_in_sentence
+from davinci_forces.report.sections import summary
 from davinci_forces.report.sections.summary.opening import verdict_sentence
 from davinci_forces.report.verdicts import (
     Trust,
@@ -184,6 +187,14 @@ def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, l
 def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, log, why):
     constant = TorqueConstant(log, "lift", 0.5, used, 12.643, 0.17)
     assert mass_level(weight(mass=0.5, mass_std=0.004, stated_mass=0.5), [constant])[1] == why
+
+
+@pytest.mark.parametrize(("mass", "is_told"), [(0.103, True), (0.1015, False)])
+def test_a_mass_that_differs_from_the_stated_one_is_to_be_looked_at_first(mass, is_told):
+    of = weight(log="hung", mass=mass, mass_std=0.001, stated_mass=0.1)
+    context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
+    told = [text for _, text in summary.looks_at_masses(context)]
+    assert told == ["**hung**: the mass is estimated 3 % too large, by 3.0 standard errors. See [@weight]."] * is_told
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

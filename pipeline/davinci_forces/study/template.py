@@ -216,8 +216,8 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
                 f"# [robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive",
             )
             yield from (
-                f"# gear_ratio = {joint.gear_ratio!r}",
-                f"# torque_constant = {joint.torque_constant!r}  # [N m/A]",
+                f"# gear_ratio = {joint.gear_ratio!r}  # [{'rad/m' if joint.kind is Kind.PRISMATIC else 'rad/rad'}]",
+                f"# torque_constant = {joint.torque_constant!r}  # [N m/A]; efforts scale with both; a mass tests them",
             )
 
 

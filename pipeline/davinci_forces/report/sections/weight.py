@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
@@ -27,7 +29,7 @@ def section(context: Context) -> Iterator[Block]:
         "effort, which differs from day to day (offset of the day), is estimated, too, if the data can separate it "
         "from the load. The standard error combines the error of the fit with a jackknife over six parts of the path. "
         "It is increased if logs without a mass give a mass that its standard error does not explain, or if the masses "
-        "that the joints give differ."
+        "that the joints give contradict each other: by chance in less than one of a hundred cases."
     )
     if weights:
         yield summary(context, weights)
@@ -66,8 +68,8 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         rows.append((*run_cells(constant), str(stated), str(used), proposed))
     caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
-        "apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml, where `effort` is "
-        "left out then. They assume the stated mass, its position and the gear ratio. Joints whose current shows "
+        'apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml; a line `effort = "A"` '
+        "there is left out. They assume the stated mass, its position and the gear ratio. Joints whose current shows "
         "the mass too imprecisely are left out."
     )
     header = ("Log", "Joint", "Known mass", "Used", "Proposed")
@@ -103,11 +105,17 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": ". The study states no mass, so the scale of the efforts is not known.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
-        "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor.",
+        "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
+        f"{literal(worst_joint(weight))}, and where the mass hung.",
         "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
+
+
+def worst_joint(weight: Weight) -> str:
+    """The joint whose mass, alone, is furthest from the stated one in standard errors."""
+    return str(weight.loaded[int(np.argmax(np.abs(weight.mass_alone - weight.stated_mass) / weight.mass_alone_std))])
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:

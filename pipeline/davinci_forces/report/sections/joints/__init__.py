@@ -135,7 +135,9 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     table_rows = tuple(parameter_row(context, fit, i, f"$theta_{n}$", f" of {joint}") for n, i in enumerate(rows, 1))
     coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
-    whose = "" if fit.group == joint else " of all joints"
+    whose = ""
+    if fit.group != joint:
+        mse, whose = getattr(mse, "text", mse), " of all joints, each in its unit squared"
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "

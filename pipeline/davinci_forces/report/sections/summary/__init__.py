@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Spectrum, Track, first_of_each_kind
+from davinci_forces.records import (
+    Contact,
+    Diagnostic,
+    Prediction,
+    Record,
+    Spectrum,
+    TorqueConstant,
+    Track,
+    Weight,
+    first_of_each_kind,
+)
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
@@ -69,8 +79,8 @@ def rule_in_words(trusts: list[Trust]) -> str:
     by_level = "detection level over the effort sought"
     by_error = "model error over effort"
     rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
-    worst = "A run is one joint in one log; runs that were not fitted decide, if there are any."
-    return f"{worst} Verdicts follow from {rule}, by [@thresholds]."
+    worst = "A joint's verdict is that of its worst log among those that no fit used, if there are any."
+    return f"{worst} It follows from {rule}, by [@thresholds]."
 
 
 def caption(contacts: list[Contact], panels: list[Panel]) -> str:
@@ -78,12 +88,11 @@ def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
-    which = (
-        "Of the contact logs, that with the largest model error is shown; of those that touch only this joint, if any."
-    )
+    one = len({contact.log for contact in contacts}) == 1
+    which = "" if one else "Of the contact logs that touch a joint, that with the largest model error is shown. "
     is_shaded = any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
-    return f"External effort of each joint{shaded}. {which} {level}"
+    return f"External effort of each joint{shaded}. {which}{level}"
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -125,13 +134,14 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
 
 def largest_peaks(context: Context, contacts: list[Contact]) -> str:
     """State the largest peak of each joint with its standard error, and the log."""
-    joints: dict[str, list[tuple[float, str, int]]] = {}
+    joints: dict[str, list[tuple[float, str, int, float]]] = {}
     for contact in (contact for contact in contacts if contact.above.any()):
         row = int(np.argmax(np.abs(contact.peak) * contact.above))
-        joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1))
+        joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1, contact.onset[row]))
     peaks = [
-        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)})"
-        for joint, (_, log, number) in ((joint, max(largest)) for joint, largest in joints.items())
+        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)}, "
+        f"from {onset:.1f} s)"
+        for joint, (_, log, number, onset) in ((joint, max(largest)) for joint, largest in joints.items())
     ]
     return f" Largest: {opening.as_list(peaks)}." if peaks else ""
 
@@ -237,6 +247,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
+    yield from looks_at_masses(context)
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     warnings = (
         (diagnostic.stage, text)
@@ -254,6 +265,17 @@ def omitted_share(spectrum: Spectrum) -> float:
     """The largest harmonic that is not kept, over the largest of all; 0 if all are kept."""
     omitted = spectrum.amplitude[spectrum.harmonics + 1 :].max(initial=0.0)
     return float(omitted / (spectrum.amplitude[1:].max(initial=0.0) or 1.0))
+
+
+def looks_at_masses(context: Context) -> Iterator[tuple[float, str]]:
+    """Yield a caveat for each mass that differs from the stated one."""
+    for weight in context.catalogue.records(Weight):
+        if verdicts.mass_level(weight, context.catalogue.records(TorqueConstant))[1] == "scale":
+            share = abs(weight.mass / weight.stated_mass - 1.0)
+            away = abs(weight.mass - weight.stated_mass) / weight.mass_std
+            side = "large" if weight.mass > weight.stated_mass else "small"
+            text = f"the mass is estimated {100 * share:.2g} % too {side}, by {away:.1f} standard errors."
+            yield WARNING, f"**{literal(weight.log)}**: {text} See [@weight]."
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:

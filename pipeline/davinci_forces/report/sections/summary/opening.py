@@ -27,14 +27,14 @@ TO_SIGN = "Reviewed by ______________________ on ______________   â˜ accept   â
 
 
 def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
-    """The verdict on the study by the rules of the table: efforts that can be believed, and what limits the others."""
+    """The verdict on the study by the rules of the table: efforts that stand out, and what limits the others."""
     fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow]
     levels = [
         f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on {name_in_sentence(t.joint)}"
         for t in fine
         if t.space is not None
     ]
-    parts = [f"efforts {as_list(levels)} can be believed"] if levels else []
+    parts = [f"efforts {as_list(levels)} stand out from free motion"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
     narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `errors` names the good
     unseen = [t for t in trusts if t.space is None]
