@@ -46,9 +46,7 @@ def section(context: Context) -> Iterator[Block]:
         )
         header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
         every = [row for contact in contacts for row in rows(context, contact)]
-        ratios = np.concatenate([np.abs(contact.peak) / contact.detection_level for contact in contacts])
-        largest = sorted(np.argsort(-ratios, kind="stable")[:PRINTED].tolist())
-        yield Table(caption, header, every, "contact-table", "llrrrrrrl", tuple(largest))
+        yield Table(caption, header, every, "contact-table", "llrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(
@@ -66,6 +64,12 @@ def alarm_levels(context: Context, contacts: list[Contact]) -> str:
     """The alarm level of each joint, in words."""
     joints = context.joints_of(contacts)
     return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
+
+
+def largest(contacts: list[Contact]) -> tuple[int, ...]:
+    """The rows of the `PRINTED` largest peaks over their joint's detection level, in the order of the table."""
+    ratios = np.concatenate([np.abs(contact.peak) / contact.detection_level for contact in contacts])
+    return tuple(sorted(np.argsort(-ratios, kind="stable")[:PRINTED].tolist()))
 
 
 def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
