@@ -7,6 +7,7 @@ import numpy as np
 from davinci_forces.estimators.problem import Estimate, Regression
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import least_squares
+from davinci_forces.records.record import join_names
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
 
@@ -111,12 +112,6 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str], omitted: fl
         remedy = "record the joint by itself, unless a model of the whole arm is chosen for it"
         return f"{text}: {move} in the same logs, which its terms omit; {remedy}"
     return f"{text}: check that its effort and motion are channels of one joint, and which terms its model needs"
-
-
-def join_names(names: Sequence[str]) -> str:
-    """Join names: 'a, b and c', with quotes around one that has a comma."""
-    *others, last = (f'"{name}"' if "," in name else name for name in names)
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 def percent(share: float) -> str:

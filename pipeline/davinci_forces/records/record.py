@@ -11,7 +11,7 @@ prefix itself.  With `{row}` (its number from 1), `{name}` or `{slug}` in the pr
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 from weakref import WeakValueDictionary
@@ -269,3 +269,13 @@ def first_of_each_kind(remarks: Iterable[tuple[str, str]]) -> Iterator[tuple[str
 def diagnostic(stage: str, subject: str, severity: str, *texts: str) -> Diagnostic:
     """Build a diagnostic of one or more lines with one severity."""
     return Diagnostic(stage, subject, np.array([severity] * len(texts), object), np.array(texts, object))
+
+
+def as_list(parts: Sequence[str]) -> str:
+    """Parts of a sentence as a list: 'a, b and c'."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+
+
+def join_names(names: Sequence[str]) -> str:
+    """Names as a list, with quotes around one that has a comma."""
+    return as_list([f'"{name}"' if "," in name else name for name in names])

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.identifiability import join_names
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
@@ -37,7 +36,7 @@ from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records.prediction import JointModel
-from davinci_forces.records.record import Diagnostic, by_name, diagnostic
+from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_names
 from davinci_forces.records.recordings import Motion
 from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.robots.robot import Robot

@@ -17,7 +17,7 @@ from davinci_forces.identification.chosen import (
     scores,
     select_candidate,
 )
-from davinci_forces.identification.identifiability import excite_command, join_names
+from davinci_forces.identification.identifiability import excite_command
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.observations import Observed, is_evaluated, observe
 from davinci_forces.identification.regression import recorded_motion
@@ -28,7 +28,7 @@ from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
 from davinci_forces.records.model import Choice, Fit, FrictionMap, ModelSearch
 from davinci_forces.records.prediction import CHOSEN, Prediction
-from davinci_forces.records.record import Diagnostic, by_name, diagnostic
+from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_names
 from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 

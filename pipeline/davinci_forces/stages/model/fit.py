@@ -15,7 +15,6 @@ from davinci_forces.identification.identifiability import (
     describe_correlated,
     describe_insignificant,
     hardly_described,
-    join_names,
     moving_with,
     why_not_positive,
 )
@@ -42,7 +41,7 @@ from davinci_forces.records.model import (
     SwarmSearch,
 )
 from davinci_forces.records.prediction import Prediction
-from davinci_forces.records.record import Column, Diagnostic, diagnostic
+from davinci_forces.records.record import Column, Diagnostic, diagnostic, join_names
 from davinci_forces.records.recordings import Motion, Spectrum, Trajectory
 from davinci_forces.robots.models import Reach, independent, round_scale
 from davinci_forces.robots.robot import Robot

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.identification.identifiability import join_names
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.contact.detection import rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
@@ -14,7 +13,7 @@ from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, i
 from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records.forces import Contact, Track
-from davinci_forces.records.record import Diagnostic, diagnostic
+from davinci_forces.records.record import Diagnostic, diagnostic, join_names
 from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, TipBudget, TipContact, TipForce
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry

@@ -17,6 +17,7 @@ from davinci_forces.records import (
     Weight,
     first_of_each_kind,
 )
+from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
@@ -143,7 +144,7 @@ def largest_peaks(context: Context, contacts: list[Contact]) -> str:
         f"from {onset:.1f} s)"
         for joint, (_, log, number, onset) in ((joint, max(largest)) for joint, largest in joints.items())
     ]
-    return f" Largest: {opening.as_list(peaks)}." if peaks else ""
+    return f" Largest: {as_list(peaks)}." if peaks else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -154,7 +155,7 @@ def efforts_in_words(context: Context) -> str:
         (Kind.PRISMATIC, ""): "force [N] at joints that slide",
     }
     currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
-    return opening.as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
+    return as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:

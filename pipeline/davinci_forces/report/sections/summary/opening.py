@@ -6,6 +6,7 @@ from hashlib import sha256
 import numpy as np
 
 from davinci_forces.records import Stiffness, TorqueConstant, Weight
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS
@@ -66,11 +67,6 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
         caution = f"so judge {whose} efforts with caution"
         follows = f"but {whose} band is too narrow" if why == "narrow" else why or caution
         yield f"on {path} the model errs by {as_list(joints)}, {follows}"
-
-
-def as_list(parts: Sequence[str]) -> str:
-    """Parts of a sentence as a list: 'a, b and c'."""
-    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
 
 
 def measurements(context: Context) -> tuple[str, ...]:
