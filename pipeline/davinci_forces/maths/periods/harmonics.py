@@ -13,6 +13,7 @@ from davinci_forces.maths.arrays import Array
 
 MAX_BASIS_SAMPLES = 1 << 15  # samples whose basis is in memory at a time
 EVEN = 256  # samples in a block of evenly spaced ones
+MIN_SHARE = 0.01  # of the largest harmonic; a motion has those above it
 SIGNIFICANT = 5.0  # times the median amplitude of noise: white noise exceeds it once in 10^7 harmonics
 UNEVEN = 1e-7  # share of the time between samples: largest deviation of an even clock
 
@@ -175,7 +176,7 @@ def largest_omitted(amplitude: Array, harmonics: int) -> tuple[int, float]:
     return order, float(amplitude[order]) / largest
 
 
-def last_above(amplitude: Array, share: float) -> int:
+def last_above(amplitude: Array, share: float = MIN_SHARE) -> int:
     """The order of the last harmonic above a share of the largest, and above the noise of `amplitude`; 0 if none is.
 
     The upper half of the spectrum is noise.

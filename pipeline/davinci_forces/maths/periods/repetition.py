@@ -20,7 +20,6 @@ ROUNDED = 1e-5  # difference that remains if the period lies between two points
 LAG_PARTS = 200  # the difference is taken as a parabola over one of this number of parts of a lag
 PERIODS_SEARCHED = 4.2  # a shorter period is searched within this number of periods
 MIN_LENGTH_RATIO = 0.8  # a section of at least this share of the longest one is as good as the longest
-MIN_HARMONIC = 0.01  # share of the largest harmonic, above which a signal has a harmonic
 SAMPLES_PER_TURN = 8  # at least, of the highest harmonic
 MIN_RUN_SHARE = 0.25  # a section with a smaller share of a recording may repeat by chance
 
@@ -56,8 +55,8 @@ def harmonics_of(signals: Sequence[Array], repeat: Repetition, least: int) -> in
     With fewer, the others would be taken for noise, and the period would be uncertain by as much.
     """
     one = slice(repeat.best_start, repeat.best_start + round(repeat.lag))
-    found = max((last_above(amplitudes(x[one]), MIN_HARMONIC) for x in signals), default=0)
-    return max(least, min(found, int(repeat.lag / SAMPLES_PER_TURN)))
+    highest = max((last_above(amplitudes(x[one])) for x in signals), default=0)
+    return max(least, min(highest, int(repeat.lag / SAMPLES_PER_TURN)))
 
 
 def _parts(N: int) -> Iterator[tuple[int, int]]:

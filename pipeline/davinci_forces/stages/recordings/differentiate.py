@@ -8,8 +8,6 @@ from davinci_forces.maths.periods import harmonics as fourier
 from davinci_forces.records import Average, Column, Diagnostic, Spectrum, Trajectory, diagnostic
 from davinci_forces.robots.robot import Joint
 
-MAX_OMITTED_HARMONIC = 0.01  # share of the largest harmonic; a larger omitted harmonic is reported
-
 
 def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajectory | Spectrum | Diagnostic]:
     """Compute position, velocity and acceleration from the harmonics of the excitation.  (6.34)
@@ -17,12 +15,12 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
     With `harmonics` 0 these are the joint's, and more where the motion itself has more.
     """
     amplitude = fourier.amplitudes(average.q)
-    orders = harmonics or max(joint.harmonics, fourier.last_above(amplitude, MAX_OMITTED_HARMONIC))
+    orders = harmonics or max(joint.harmonics, fourier.last_above(amplitude))
     q, dq, ddq = derivatives(average, orders)
     yield Trajectory.like(average, harmonics=orders, q=q, dq=dq, ddq=ddq)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
     largest, share = fourier.largest_omitted(amplitude, orders)
-    if share > MAX_OMITTED_HARMONIC:
+    if share > fourier.MIN_SHARE:
         yield diagnostic(
             "differentiate", f"{average.log}.{average.joint}", "warning",
             f"{average.log}/{average.joint}: harmonic {largest} of the position is "
