@@ -225,11 +225,11 @@ def torque_constants(
         if not load.is_current:
             continue
         if not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
-            text = (
-                f"{load.log}/{load.joint}: its current shows the known mass too imprecisely for a torque constant, as "
+            why = (
+                "its current shows the known mass too imprecisely for a torque constant, as where its axis is vertical"
             )
-            remedy = "where its axis is vertical; take the constant from a data sheet, or pull with a known force"
-            yield diagnostic("weigh", f"{load.log}.{load.joint}.torque-constant", "note", text + remedy)
+            text = f"{load.log}/{load.joint}: {why}; take the constant from a data sheet, or pull with a known force"
+            yield diagnostic("weigh", f"{load.log}.{load.joint}.torque-constant", "note", text)
             continue
         assert weighing.weight.mass
         scaled = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)

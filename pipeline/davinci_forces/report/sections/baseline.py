@@ -38,7 +38,6 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
         rows = [
             (literal(c.key), literal(_text(c.before)), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
             for c in changed[:MAX_ROWS]
-            if c.before
         ]
         which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")
         values = "values a and b, and b minus a over its standard error."
@@ -53,7 +52,8 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
             yield OnScreen(f"{count(len(keys), what + ' key')}", anchor, (listed,))
 
 
-def _text(stated: StatedValue) -> str:
+def _text(stated: StatedValue | None) -> str:
+    assert stated  # of a number that both reports have
     if stated.number is None:
         return str(stated.value)
     return str(Number(stated.number, format_unit(stated.unit), stated.std))

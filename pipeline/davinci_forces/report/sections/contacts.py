@@ -45,8 +45,8 @@ def section(context: Context) -> Iterator[Block]:
             "level, so that it may be an error of the model."
         )
         header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
-        every = [row for contact in contacts for row in rows(context, contact)]
-        yield Table(caption, header, every, "contact-table", "llrrrrrrl", largest(contacts))
+        of_contacts = [row for contact in contacts for row in rows(context, contact)]
+        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(

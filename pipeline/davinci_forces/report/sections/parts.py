@@ -8,11 +8,21 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.maths.arrays import evenly
-from davinci_forces.records import Column, PathShare, Prediction, Record, Residual, Track, Whiteness
-from davinci_forces.report.content import Block, OnScreen, Panel, Section, Table, literal
+from davinci_forces.records import (
+    Column,
+    PathShare,
+    Prediction,
+    Record,
+    Residual,
+    TorqueConstant,
+    Track,
+    Weight,
+    Whiteness,
+)
+from davinci_forces.report.content import Block, Level, OnScreen, Panel, Section, Table, literal
 from davinci_forces.report.content.marks import AnyMark, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.verdicts import Trust, decisive
+from davinci_forces.report.verdicts import Trust, decisive, mass_level
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
@@ -61,6 +71,11 @@ def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int 
     yield from blocks[:number]
     if blocks[number:]:
         yield OnScreen(name, anchor, tuple(blocks[number:]))
+
+
+def grade_of_mass(context: Context, weight: Weight) -> tuple[Level, str]:
+    """The verdict on the mass of a weight log, and why, with the torque constants that known masses gave."""
+    return mass_level(weight, context.catalogue.records(TorqueConstant))
 
 
 def trust(context: Context, joint: str) -> Trust:

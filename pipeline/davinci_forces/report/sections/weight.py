@@ -9,8 +9,8 @@ from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import run_cells, section_of
-from davinci_forces.report.verdicts import PRECISE, mass_level, percent
+from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
+from davinci_forces.report.verdicts import PRECISE, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
@@ -99,7 +99,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
     mass, scale = (context.number(f"weight.{weight.log}.{name}", 3) for name in ("mass", "scale"))
     stated = f"{Number(weight.stated_mass, 'kg')} is stated."
-    level, why = mass_level(weight, context.catalogue.records(TorqueConstant))
+    level, why = grade_of_mass(context, weight)
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",

@@ -137,7 +137,8 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     whose = ""
     if fit.group != joint:
-        mse, whose = getattr(mse, "text", mse), " of all joints, each in its unit squared"
+        whose = " of all joints, each in its unit squared"
+        mse = mse.text if isinstance(mse, Number) else mse
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "

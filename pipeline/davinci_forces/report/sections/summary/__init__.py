@@ -12,7 +12,6 @@ from davinci_forces.records import (
     Prediction,
     Record,
     Spectrum,
-    TorqueConstant,
     Track,
     Weight,
     first_of_each_kind,
@@ -22,7 +21,7 @@ from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
+from davinci_forces.report.sections.parts import grade_of_mass, scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
 from davinci_forces.robots.robot import Kind
@@ -271,7 +270,7 @@ def omitted_share(spectrum: Spectrum) -> float:
 def looks_at_masses(context: Context) -> Iterator[tuple[float, str]]:
     """Yield a caveat for each mass that differs from the stated one."""
     for weight in context.catalogue.records(Weight):
-        if verdicts.mass_level(weight, context.catalogue.records(TorqueConstant))[1] == "scale":
+        if grade_of_mass(context, weight)[1] == "scale":
             share = abs(weight.mass / weight.stated_mass - 1.0)
             away = abs(weight.mass - weight.stated_mass) / weight.mass_std
             side = "large" if weight.mass > weight.stated_mass else "small"
@@ -287,12 +286,11 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
         (4.0, same, "the path that was fitted ({}), where the model's error repeats."),
         (2.0, parts, "parts of fitted logs ({}) that refits left out; on another path the error may be larger."),
     )
-    for weight, some, where in where_tested:
+    for weight, some, where in (tested for tested in where_tested if tested[1]):
         logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in some if trusted.prediction is not None)
-        names, tested = ", ".join(title(trusted.joint) for trusted in some), where.format(", ".join(logs))
+        names = ", ".join(title(trusted.joint) for trusted in some)
         remedy = f"Record a validation log on another path.{see(context, Prediction, 'prediction')}"
-        if some:
-            yield weight, f"**{names}**: tested only on {tested} {remedy}"
+        yield weight, f"**{names}**: tested only on {where.format(', '.join(logs))} {remedy}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:

@@ -5,12 +5,12 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.records import Stiffness, TorqueConstant, Weight
+from davinci_forces.records import Stiffness, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
-from davinci_forces.report.sections.parts import RATINGS
-from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, mass_level, percent, stiffness_level
+from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
+from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
 USES = {  # what the logs of each role are for
@@ -81,7 +81,7 @@ def masses(context: Context) -> Iterator[str]:
     for weight in context.catalogue.records(Weight):
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
-        level, why = mass_level(weight, context.catalogue.records(TorqueConstant))
+        level, why = grade_of_mass(context, weight)
         stated += ", which gave a torque constant in use: no test of it" * (why == "taken")
         yield f"{WORDS.get(level, '')} **{literal(weight.log)}**: mass {mass}{stated}".strip()
 
