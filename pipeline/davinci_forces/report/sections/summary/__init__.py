@@ -88,8 +88,8 @@ def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
-    one = len({contact.log for contact in contacts}) == 1
-    which = "" if one else "Of the contact logs that touch a joint, that with the largest model error is shown. "
+    which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
+    which *= len({contact.log for contact in contacts}) > 1
     is_shaded = any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
     return f"External effort of each joint{shaded}. {which}{level}"
