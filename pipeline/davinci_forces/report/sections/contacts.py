@@ -121,8 +121,8 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
         HBand(-level, level, "detection level" if named else ""),
         Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
     )
-    whole = (0.0, max(len(peak), 3) + 1.0)  # numbered by whole windows
-    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks, x_range=whole)
+    few = (0.0, 4.0) if len(peak) < 3 else None  # so that an axis of one or two windows is numbered by whole ones
+    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks, x_range=few)
 
 
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
