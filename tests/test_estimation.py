@@ -306,6 +306,18 @@ def test_the_path_of_a_fitted_log_is_new_only_where_no_other_fitted_log_follows_
     assert path_new(other, [trajectory(one), trajectory(again)]) > 0.1
 
 
+@pytest.mark.parametrize("faster", [0.5, 2.0])
+def test_the_speed_of_a_log_is_compared_with_that_of_the_fastest_fitted_one(faster):
+    def scaled(by, **about):
+        signal = arm.signal(**about)
+        return replace(signal, q=by * signal.q, dq=by * signal.dq)
+
+    fitted = [trajectory(scaled(by, seed=i, log=str(i))) for i, by in enumerate((1.0, 0.5))]
+    identified = Identified(arm.ARM, [r for r in fitted_to(fitted) if isinstance(r, FittedPaths)])
+    motion = arm.motion(scaled(faster, seed=9, log="other"))
+    assert identified.speed_ratio(motion) == pytest.approx(faster, rel=0.02)
+
+
 def test_a_path_of_which_a_third_is_new_is_another():
     seen, signal = [trajectory(arm.signal(log="seen"))], arm.signal(seed=9, log="other")
     signal = replace(signal, q=signal.q + 0.7 * np.std(signal.q) * np.sqrt(2) * np.cos(3.7 * signal.t))

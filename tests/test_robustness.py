@@ -577,15 +577,19 @@ def test_a_stuck_sensor_and_a_saturated_drive_are_said():
     assert "was saturated" in remarked(lambda c: c.update(tau=np.minimum(c["tau"], limit)))
 
 
-def test_positions_beyond_twice_the_limits_are_remarked_on_and_beyond_twenty_times_refused():
+def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond_twenty_times_refused():
     far = np.quantile(np.abs(arm.signal("hand_roll", rate=100.0, periods=2).q), 0.99) / 0.6
 
     def at(times):
         return remarked(lambda c: c.update(q=times / far * c["q"], dq=times / far * c["dq"]))
 
-    assert at(1.9) == ""
+    assert at(1.0) == ""
+    assert at(1.1) != at(1.9)
+    for times in (1.1, 1.9):
+        assert "rad where the robot states -0.6 to 0.6; correct its limits for `excite`, or the units" in at(times)
     for times in (2.1, 19.0):
         assert "times the limit of 0.6 rad" in at(times)
+        assert "positions from" not in at(times)
     with pytest.raises(BadLog, match=r"times the limit of 0\.6 rad.*write the unit of the channel"):
         at(21.0)
 

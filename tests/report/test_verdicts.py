@@ -105,7 +105,7 @@ def test_a_path_is_new_to_the_report_where_it_is_new_to_the_stages():
 
 
 def path_share(log, path_new=1.0, moving=1.0):
-    return PathShare(log, "roll", "identification", path_new, moving)
+    return PathShare(log, "roll", "identification", path_new, moving, 1.0)
 
 
 def by_blocks(log="one", error=0.05):
@@ -195,6 +195,17 @@ def test_a_mass_that_differs_from_the_stated_one_is_to_be_looked_at_first(mass, 
     context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
     told = [text for _, text in summary.looks_at_masses(context)]
     assert told == ["**hung**: the mass is estimated 3 % too large, by 3.0 standard errors. See [@weight]."] * is_told
+
+
+def test_of_motions_faster_than_all_fitted_ones_the_fastest_is_to_be_looked_at():
+    ratios = {"slow": 1.45, "unknown": np.nan, "fast": 1.6, "faster": 3.1}
+    shares = [replace(path_share(log), speed_ratio=ratio) for log, ratio in ratios.items()]
+    for count, told in ((2, []), (4, ["**Roll, faster**: it moves 3.1 times as fast as in any fitted log"])):
+        catalogue = Catalogue(lambda kind, some=shares[:count]: some if kind is PathShare else [])
+        context = SimpleNamespace(catalogue=catalogue, number=lambda key, digits: f"{ratios[key.split('.')[1]]}")
+        looks = [text.partition(", so ")[0] for _, text in summary.looks_at_speeds(context, ["roll"])]
+        assert looks == told
+        assert not [*summary.looks_at_speeds(context, ["pitch"])]
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

@@ -13,6 +13,7 @@ from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
 from davinci_forces.maths.periods.shift import likeness
 from davinci_forces.maths.signals.smoothing import delay_segments, segments
+from davinci_forces.maths.signals.standstill import speed_of
 from davinci_forces.records import Choice, Fit, FittedPaths, JointModel, Motion, Prediction
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import ARM, model_of
@@ -119,6 +120,11 @@ class Identified:
             if log != motion.log
         ]
         return 1.0 - max([0.0, *likenesses]) ** 2
+
+    def speed_ratio(self, motion: Motion) -> float:
+        """Return the speed of a recording over that of the fastest fitted log; NaN if no fitted path is known."""
+        paths = self._paths.get(motion.joint)
+        return speed_of(motion.dq) / paths.speed if paths is not None else np.nan
 
 
 class LogModels:

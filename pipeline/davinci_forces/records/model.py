@@ -130,6 +130,7 @@ class Identifiability(Record):
 class FittedPaths(JointRecord):
     """The fitted paths of a joint, one period per path, one after the other; of many paths, those that differ most."""
 
+    speed: float  # of its fastest log
     source: Labels  # the log that follows the path
     period: Column
     t: Column

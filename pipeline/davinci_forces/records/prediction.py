@@ -57,13 +57,16 @@ class Prediction(LogJointRecord):
 
 
 class PathShare(LogJointRecord):
-    """The share of a joint's path that no other identification log follows, and the share of time in motion."""
+    """How new a joint's motion is: the share of its path that no other identification log follows, its speed over that
+    of the fastest of these logs, and the share of time in motion.
+    """
 
-    PUBLISHED = ("path.{log}.{joint}: path_new moving",)
+    PUBLISHED = ("path.{log}.{joint}: path_new speed_ratio moving",)
 
     role: str
     path_new: float
     moving: float
+    speed_ratio: float  # NaN where no fitted path is known
 
 
 class JointModel(LogJointRecord):

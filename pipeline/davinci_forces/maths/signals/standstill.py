@@ -11,6 +11,7 @@ STILL_AT_MOST = 0.05  # largest such share with noise; the slowest reversals of 
 NOISE = 6.0  # range of a resting position, in standard deviations of its noise
 # [s] left out around a reversal: after `AFTER`, the effect of the reversal on a filter has decayed.
 BEFORE, AFTER = 0.05, 0.25
+FASTEST = 99.0  # [%] of samples are slower than the speed of a motion, so that an outlier is none
 SLOW = 0.05  # friction may stick below this share of the root mean square of the velocity
 
 
@@ -25,6 +26,11 @@ def is_standing_still(
     least, window = least_travel(dq, q_std), round(HOLD * rate) + 1
     parts = [_standing(q[part], window, spread, least) for part in segments(segment)]
     return np.concatenate(parts) if parts else np.zeros(0, np.bool_)
+
+
+def speed_of(dq: Array) -> float:
+    """The speed of a motion with velocity (N,): its largest, but for outliers."""
+    return float(np.percentile(np.abs(dq), FASTEST))
 
 
 def least_travel(dq: Array, q_std: float) -> float:

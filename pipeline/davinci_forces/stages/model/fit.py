@@ -29,6 +29,7 @@ from davinci_forces.maths.models.independent import IndependentJoint, inertia_of
 from davinci_forces.maths.periods.harmonics import largest_omitted
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.maths.selection import side_by_side
+from davinci_forces.maths.signals.standstill import speed_of
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
 from davinci_forces.records.model import (
     CrossFit,
@@ -348,6 +349,7 @@ def cross_fits(
 
 def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Diagnostic]:
     """The paths of a joint's logs; of more than `MAX_PATHS` paths, those that differ most."""
+    speed = max(speed_of(part.dq) for part in parts)
     indices, likeness = most_different([(part.t, part.q, part.period) for part in parts], MAX_PATHS)
     if likeness < SAME_PATH:
         message = f"{joint}: its identification logs follow more than {MAX_PATHS} paths"
@@ -356,6 +358,7 @@ def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Di
     parts = [parts[i] for i in indices]
     yield FittedPaths(
         joint=joint,
+        speed=speed,
         source=np.repeat(np.array([part.log for part in parts], object), [len(part.t) for part in parts]),
         period=np.repeat([part.period for part in parts], [len(part.t) for part in parts]),
         t=np.concatenate([part.t for part in parts]),

@@ -36,17 +36,18 @@ def run(
 ) -> Iterator[Prediction | PathShare | Diagnostic]:
     """Predict the effort of each moving joint by each fit, in a log that no parameter was fitted to.
 
-    Of every log of free motion or contact, the share of its path that other logs do not follow is computed.  A joint
-    at rest is not predicted, and standstill is not scored: friction takes any value up to its static level there.
-    Stages `fit` and `choose` predict identification logs.
+    Of every log of free motion or contact, it is computed how new its path and its speed are.  A joint at rest is not
+    predicted, and standstill is not scored: friction takes any value up to its static level there.  Stages `fit` and
+    `choose` predict identification logs.
     """
     if entry.role not in ("identification", "validation", "contact"):
         return
     along = LogModels(Identified(robot, fits), motions)
     for motion in motions:
         if not motion.at_rest:
-            new, moving = along.identified.path_new(motion), float(np.mean(motion.standing == 0))
-            yield PathShare(motion.log, motion.joint, motion.role, new, moving)
+            identified, moving = along.identified, float(np.mean(motion.standing == 0))
+            new, speed = identified.path_new(motion), identified.speed_ratio(motion)
+            yield PathShare(motion.log, motion.joint, motion.role, new, moving, speed)
             if entry.role != "identification":
                 yield from predict_joint(motion, along, entry, lowpass, fit)
 

@@ -26,6 +26,7 @@ VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with the
 MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_VELOCITY_RATIO = 5.0  # beyond it or below its inverse, the log contradicts itself, and is refused
 MAX_BEYOND_LIMITS, IMPOSSIBLE = 2.0, 20.0  # as multiples of a joint's limits; a warning, and a refusal
+OVER_LIMITS = 0.02  # of the range between limits, above which an excess is noted
 USUAL_LIMITS = (2.0 * np.pi, 20.0)  # [rad or m, rad/s or m/s] limits of a joint that states none, only to warn
 MIN_JUMP, MAX_USUAL = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
 UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the position; mm only of joints that slide
@@ -77,6 +78,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         at_rest, signal, motion = True, replace(signal, at_rest=1), replace(motion, at_rest=1)
     yield signal
     yield motion
+    yield from beyond_limits(recording, joint, smooth)
     yield from remarks(signal, recording, T_s, cuts, sum(part.stop - part.start for part in parts))
     if recording.role not in ("tissue", "friction") and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
@@ -173,6 +175,24 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
         if largest > IMPOSSIBLE:
             raise BadLog(fault)
         yield fault
+
+
+def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[Diagnostic]:
+    """Note low-passed positions and velocities that exceed the joint's limits by less than a wrong unit would."""
+    beyond = []
+    for what, unit, x, bounds in zip(
+        ("positions", "velocities"), ("", "/s"), smooth, (joint.limits.q, joint.limits.dq), strict=False
+    ):
+        low, high = np.percentile(x, (1.0, 99.0))
+        slack = OVER_LIMITS * (bounds[1] - bounds[0])
+        if (low < bounds[0] - slack or high > bounds[1] + slack) and max(-low, high) <= MAX_BEYOND_LIMITS * max(
+            map(abs, bounds)
+        ):
+            spans = "{:.3g} to {:.3g} {{position}}{} where the robot states {:.3g} to {:.3g}"
+            beyond.append(joint.unit(f"{what} from {spans.format(low, high, unit, *bounds)}"))
+    if beyond:
+        text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; correct its limits for `excite`, or the units"
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", "note", text)
 
 
 def faults(recording: Recording) -> Iterator[str]:

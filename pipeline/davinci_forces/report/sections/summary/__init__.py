@@ -9,6 +9,7 @@ import numpy as np
 from davinci_forces.records import (
     Contact,
     Diagnostic,
+    PathShare,
     Prediction,
     Record,
     Spectrum,
@@ -247,6 +248,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
+    yield from looks_at_speeds(context, [trusted.joint for trusted in trusts])
     yield from looks_at_masses(context)
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     warnings = (
@@ -291,6 +293,24 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
         names = ", ".join(title(trusted.joint) for trusted in some)
         remedy = f"Record a validation log on another path.{see(context, Prediction, 'prediction')}"
         yield weight, f"**{names}**: tested only on {where.format(', '.join(logs))} {remedy}"
+
+
+def looks_at_speeds(context: Context, joints: list[str]) -> Iterator[tuple[float, str]]:
+    """Yield a caveat for the joint and log that are fastest, compared with fitted logs."""
+    shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
+    fastest = max(shares, key=lambda share: np.nan_to_num(share.speed_ratio), default=None)
+    if fastest is not None and fastest.speed_ratio > verdicts.MAX_SPEED_RATIO:
+        name, ratio = (
+            f"{title(fastest.joint)}, {literal(fastest.log)}",
+            context.number(f"path.{fastest.log}.{fastest.joint}.speed_ratio", 2),
+        )
+        text = (
+            f"it moves {ratio} times as fast as in any fitted log, so its model extrapolates, and errors may be larger."
+        )
+        yield (
+            fastest.speed_ratio / verdicts.MAX_SPEED_RATIO,
+            f"**{name}**: {text} Record an identification log as fast.",
+        )
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
