@@ -2,7 +2,7 @@
 
 import pytest
 
-from davinci_forces.maths.units import UNITS, canonical, measures, size, split_ratio, unit_in
+from davinci_forces.maths.units import UNITS, canonical, measures, size, split_ratio, unit_after_groups, unit_in
 
 SPELLED = {
     "deg": ("°", "Deg", "DEGREES", "degs"),
@@ -122,6 +122,16 @@ def test_a_quantity_over_its_unit_is_split():
     assert split_ratio("dq / (deg/s)") == ("dq", "deg/s")
     assert split_ratio("dq (deg/s)") == ("dq (deg/s)", "")
     assert split_ratio("/arm/s") == ("/arm/s", "")
+    assert split_ratio("Roll vel, rad/s") == ("Roll vel", "rad/s")
+    assert split_ratio("speed_deg/s") == ("speed", "deg/s")
+
+
+def test_the_unit_of_a_channel_in_groups_stands_after_their_names():
+    named = {
+        "Roll vel (deg/s)": "deg/s", "arm/1/speed [m/s]": "m/s", "arm/speed deg/s": "deg/s", "arm/q_deg": "deg",
+        "group [A]/q [rad]": "rad", "group [A]/count": "", "arm/time / ms": "ms", "rad/s/q": "",
+    }  # fmt: skip
+    assert {name: unit_after_groups(name) for name in named} == named
 
 
 def test_sizes_are_those_of_si():

@@ -195,6 +195,12 @@ def test_names_that_look_like_markup_come_through_as_they_are() -> None:
     assert set(names) < set(samples)
 
 
+def test_a_unit_with_a_slash_in_a_name_is_read() -> None:
+    names = {"Roll vel (deg/s)": "deg/s", "Motors/Roll vel [rad/s]": "rad/s"}
+    log, _ = read(lvm([Write({name: [1.0] for name in names}, x=[0.0])]))
+    assert {channel.name: channel.unit for channel in log.channels if channel.name in names} == names
+
+
 def test_a_comment_is_unescaped() -> None:
     log, _ = read(lvm([Write({"a": [1.0]}, x=[0.0], comment=r"one\0Atwo \\ three")]))
     assert log.comments[0].endswith("one\ntwo \\ three")

@@ -7,7 +7,7 @@ from pathlib import Path
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.log import Channel, Log, Options
-from davinci_forces.maths.units import unit_in
+from davinci_forces.maths.units import unit_after_groups
 
 # Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
 FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "npz", "xlsx", "binary", "text")
@@ -40,5 +40,5 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
 def _with_unit(channel: Channel) -> Channel:
     """A channel with the unit that its name states, if the log states none."""
     is_quantity = channel.kind == "number" and not channel.derived
-    unit = unit_in(channel.name.rpartition("/")[2]) if is_quantity and not channel.unit else ""
+    unit = unit_after_groups(channel.name) if is_quantity and not channel.unit else ""
     return replace(channel, unit=unit) if unit else channel

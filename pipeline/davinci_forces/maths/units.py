@@ -46,6 +46,8 @@ ONLY_AFTER = {
 }  # fmt: skip
 IN_BRACKETS = re.compile(r"(?<=\S)\s*[\[({]\s*([^\[\](){}]*?)\s*[\])}]")
 INDEX = re.compile(r"\d*|[^\W\d]\w*_\w*|[^\W\d]+ ?\d+")  # `q[0]`, `effort[outer_yaw]`, `q (joint 1)`
+RATE = re.compile(r"[\s,_]+([^\W\d_]+|°)$")  # of `speed deg`, before a slash and a time
+GROUP = re.compile(r"/(?![^\[({]*[\])}])")  # a slash after the name of a group: not one in brackets
 CAPITAL = re.compile(r"(?<=[a-z]{3})(?=m(?:A|Nm?)$)|(?<=[a-z])(?=[A-Z])")  # `currentmA`, `angleDeg`
 
 
@@ -70,11 +72,21 @@ def unit_in(name: str) -> str:
     return split_ratio(name)[1] or _in_brackets(name) or unit_among_words(name)
 
 
+def unit_after_groups(name: str) -> str:
+    """The unit that the name of a channel in groups states: `arm/1/speed [deg/s]`, `arm/speed deg/s`."""
+    parts = GROUP.split(name)
+    rate = split_ratio("/".join(parts[-2:]))[1]
+    return rate if "/" in rate else unit_in(parts[-1].strip())
+
+
 def split_ratio(name: str) -> tuple[str, str]:
-    """Split `time / ms`, a quantity over its unit, into both; the unit of any other name is ""."""
+    """Split `time / ms`, a quantity over its unit, or `speed deg/s` into both; the unit of any other name is ""."""
     for slash in re.finditer("/", name if "/" in name and not measures(name) else ""):
         quantity, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
         if not quantity.startswith("/") and not re.search(r"[\[({][^\])}]*$", quantity) and quantity and _is_unit(unit):
+            rate = RATE.search(quantity)
+            if rate and measures(f"{rate[1]}/{unit}"):
+                return quantity[: rate.start()], f"{rate[1]}/{unit}"
             return quantity, unit.strip("()")
     return name, ""
 

@@ -30,6 +30,7 @@ from davinci_forces.robots.robot import Kind
 SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
 # In a warning of any stage that blames units, or leaves a joint without an answer.
 COMES_FIRST = re.compile(r"check the units|its external effort is not estimated")
+LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
@@ -251,11 +252,13 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     yield from looks_at_speeds(context, [trusted.joint for trusted in trusts])
     yield from looks_at_masses(context)
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
+    fitted = [log.name for log in context.study.logs if log.role == "identification"]
+    lost = any(task.split(" ")[-1] in fitted for task in context.provenance.failures)
     warnings = (
         (diagnostic.stage, text)
         for diagnostic in context.catalogue.records(Diagnostic)
         for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True)
-        if severity == "warning"
+        if severity == "warning" and not (lost and text.startswith(LACKS_LOGS))
     )
     for stage, text in first_of_each_kind(warnings):
         by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
