@@ -586,6 +586,16 @@ def test_a_fault_of_a_candidate_stands_beside_the_fits_and_not_on_page_one(full:
     assert not any("inertia" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05)))
 
 
+def test_advice_that_a_failed_log_may_have_followed_is_not_on_page_one(full: Context, catalogue: Catalogue):
+    advice = diagnostic("choose", "together", "warning", "arm: no identification log moves roll and pitch together")
+    records = Catalogue(lambda kind: [advice] if kind is Diagnostic else catalogue.records(kind))
+    roles = {log.role: log.name for log in full.study.logs}
+    for failed, is_told in (("identification", False), ("contact", True)):
+        failures = {f"ingest {roles[failed]}": "there is no channel 'q'"}
+        about = replace(full, catalogue=records, provenance=replace(full.provenance, failures=failures))
+        assert any("together" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05))) == is_told
+
+
 def test_the_middle_of_a_log_is_drawn_of_filters_that_are_compared(full: Context):
     [compared, *_] = full.catalogue.records(Comparison)
     t = 100.0 + np.arange(3000) / 50.0
