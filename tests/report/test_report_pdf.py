@@ -212,3 +212,10 @@ def test_a_table_of_printed_rows_counts_the_others() -> None:
     text = re.sub(r"\s+", " ", read(pdf.render(one(Table("Contacts.", ("a", "b"), rows, printed=(3, 7))))))
     assert "Contacts. 28 more in the HTML report." in text
     assert [row for row, _ in rows if re.search(rf"{row}\b", text)] == ["row-3", "row-7"]
+
+
+def test_no_line_begins_with_the_unit_of_a_number():
+    text, code, _, bold = pdf._inline("errs by 4 % in 2 logs and `at 5 s` **2.0 ± 0.1 N m on 3 masses**")
+    assert text["text"] == "errs by 4\N{NO-BREAK SPACE}% in 2 logs and "
+    assert code["text"] == "at 5 s"
+    assert bold["text"] == "2.0 ± 0.1 N m on 3 masses".replace(" ", "\N{NO-BREAK SPACE}", 4)

@@ -1,5 +1,6 @@
 """The report as PDF, typeset by Typst: the template reads the document as data, so no text can become markup."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.typesetting import typeset
 
 TEMPLATE = Path(__file__).parent / "templates/report.typ"
+MEASURED = re.compile(r"\d(?: ± [\d.]+)? (?:%|(?:N m|N|A|rad|mm|m|s|ms|Hz|kg)\b)")  # numbers with units in text
 Json = dict[str, Any]
 
 
@@ -42,8 +44,12 @@ def _placed(item: Placed) -> Json:
 
 
 def _inline(text: str) -> list[Json]:
-    """Marked text in the form that the template reads."""
-    return [span._asdict() for span in parse(text)]
+    """Marked text in the form that the template reads; no line begins with the unit of a number."""
+    spans = (
+        span._replace(text=MEASURED.sub(lambda m: m[0].replace(" ", NO_BREAK), span.text))
+        if span.kind in ("text", "bold") else span for span in parse(text)
+    )  # fmt: skip
+    return [span._asdict() for span in spans]
 
 
 def _table(table: content.Table) -> Json:
