@@ -448,19 +448,23 @@ def test_contact_told_by_the_efforts_of_several_joints_is_to_be_checked(tmp_path
     assert 'role = "contact"  # CHECK: a contact, or coupled joints: ' in (tmp_path / "study.toml").read_text()
 
 
-def test_rostopic_s_columns_of_names_tell_the_joints(tmp_path):
+def test_rostopic_s_columns_of_names_tell_the_joints_and_its_stamps_the_times(tmp_path):
     t, *signals = recorded(0, 4, repeats=True)
     columns = [f"field.{word}{k}" for word in ("name", "position", "velocity", "effort") for k in range(4)]
     with (tmp_path / "run.csv").open("w") as file:
-        file.write(f"%time,{','.join(columns)}\n")
+        file.write(f"%time,field.header.stamp,{','.join(columns)}\n")
         for row in zip(t, *signals, strict=True):
             cells = [f"{x:.6f}" for part in row[1:] for x in part]
             stamp = 1764000000000000000 + round(row[0] * 1e9)
-            file.write(f"{stamp},outer_yaw,outer_pitch,outer_insertion,outer_roll,{','.join(cells)}\n")
+            file.write(f"{stamp + 7},{stamp},outer_yaw,outer_pitch,outer_insertion,outer_roll,{','.join(cells)}\n")
     call("new", tmp_path)
     [entry] = reading.read(tmp_path).logs
     found = {source.quantity: source.channel for source in entry.channels}
     assert found.get("hand_roll.q") == "field.position0", found
     assert found["instrument_slide.tau"] == "field.effort2"
+    assert found["time"] == "field.header.stamp"
+    text = (tmp_path / "study.toml").read_text()
+    assert '# time = "time"  # a time that is not used' in text
+    assert "field.name" not in text
     other = '# "<joint>.<quantity>" = "field.effort3"  # field.effort[outer_roll], no joint of dvrk_psm'
-    assert other in (tmp_path / "study.toml").read_text()
+    assert other in text

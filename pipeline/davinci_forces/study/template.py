@@ -371,7 +371,7 @@ class _Writer:
         big = _in_millimetres(log, touching)
         for channel in log.channels:
             meaning = holding.meanings.get(channel.name)
-            if channel.derived:
+            if channel.derived or channel.kind == "text":
                 continue
             if channel.name in self.draft.sensor:
                 line = _touch_line(channel, self.draft.sensor[channel.name], in_millimetres=False)
@@ -385,8 +385,8 @@ class _Writer:
                 yield _time_line(channel, timing.size, timing.reason)
             elif channel.name == log.time:
                 yield f"time = {_text(channel.name)}  # the log's own"
-            elif is_time(channel) and log.clock is not None:
-                yield f"# time = {_text(channel.name)}  # the log has its own clock"
+            elif is_time(channel):
+                yield f"# time = {_text(channel.name)}  # {'the log has its own clock' if log.clock else 'a time that is not used'}"
             else:
                 symbol = without_joint.get(channel.name, "")
                 notes = ["MISSING: the joint"] * bool(symbol) + [f"in {channel.unit}"] * bool(channel.unit)

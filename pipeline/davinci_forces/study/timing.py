@@ -12,7 +12,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.signals.clock import interruptions
 from davinci_forces.maths.units import measures, since_1970, size
-from davinci_forces.study.names import is_time
+from davinci_forces.study.names import is_time, words_of
 
 MAX_SAMPLES = 200_000  # samples of a log that are read
 MAX_CHANNELS = 400  # channels of a log whose samples are read
@@ -100,6 +100,7 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
         return _timing_of_format(log, samples, pairs, per_sample)
     numbers = [c for c in log.channels if c.kind == "number" and not c.derived and c.name in samples]
     times = [channel for channel in numbers if is_time(channel) and _rises(samples[channel.name])]
+    times.sort(key=lambda channel: "header" not in words_of(channel.name))  # when it was measured, not received
     if unnamed and not times:
         first = columns.first_rising_column([samples[channel.name] for channel in numbers])
         times = [numbers[first]] if first is not None else []
