@@ -196,8 +196,9 @@ def gather(
             if carrying:
                 message = "the efforts of the joints that carry the mass are currents"
                 remedy = "state their torque_constant, which a log of a known mass gives"
-                if given := [record.joint for record in constants if isinstance(record, TorqueConstant)]:
-                    remedy = f"this known mass gives the torque_constant of {join_names(given)}; write each in "
+                given = [x for x in constants if isinstance(x, TorqueConstant)]
+                if values := [f"torque_constant = {x.torque_constant:.4g} for {x.joint}" for x in given]:
+                    remedy = f"this known mass gives {join_names(values)}; write each in "
                     remedy += '[robot_overrides.<joint>] of study.toml, in place of effort = "A"'
             text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", text)

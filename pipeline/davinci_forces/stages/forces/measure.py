@@ -144,7 +144,10 @@ def steady_effort(track: Track) -> tuple[Array, Array]:
 def hidden_peak(track: Track, onset: float) -> str:
     """State that a contact is too short for its peak to be seen."""
     text = f"{track.log}/{track.joint}: the contact at {onset:.4g} s is shorter than {track.smooth_rise:.2g} s, "
-    remedy = "state a window of a second around it in study.toml, and read its impulse"
+    remedy = (
+        "state a window of a second around it in study.toml, and read its impulse; if nothing touched the arm then, it "
+        "is an error of the model"
+    )
     return f"{text}which the smoother takes to show a step, so its peak may be several times larger: {remedy}"
 
 
