@@ -386,7 +386,8 @@ class _Writer:
             elif channel.name == log.time:
                 yield f"time = {_text(channel.name)}  # the log's own"
             elif is_time(channel):
-                yield f"# time = {_text(channel.name)}  # {'the log has its own clock' if log.clock else 'a time that is not used'}"
+                why = "the log has its own clock" if log.clock else "a time that is not used"
+                yield f"# time = {_text(channel.name)}  # {why}"
             else:
                 symbol = without_joint.get(channel.name, "")
                 notes = ["MISSING: the joint"] * bool(symbol) + [f"in {channel.unit}"] * bool(channel.unit)
