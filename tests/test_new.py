@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 import davinci_forces
 from davinci_forces import robots
 from davinci_forces.maths.signals import columns
+from davinci_forces.robots.robot import Kind
 from davinci_forces.study import reading
+from tests.logs.lvm_writer import Style, Write, lvm
 from tests.simulation.six_joints import write
 from tests.test_runs import call
 
@@ -200,6 +202,71 @@ def test_words_in_brackets_tell_the_joint_by_their_order_and_what_was_wanted_is_
         "time": "t", "pan.q": "position[pan]", "lift.q": "position[lift]",
         "pan.tau": "effort[pan]", "lift.tau": "effort[lift]",
     }  # fmt: skip
+
+
+# Templates of position, velocity (where there is one) and effort; labels of the joints; the joints; "i" or "tau".
+NAMES = {
+    "units that differ by joint": (
+        ["Position joint {} [{}]", "Velocity joint {} [{}/s]", "Current joint {} [mA]"],
+        [("1", "deg"), ("2", "deg"), ("3", "deg"), ("4", "mm")], ["joint_1", "joint_2", "joint_3", "joint_4"], "i",
+    ),
+    "words of joints with units": (
+        ["Winkel {} [{}]", "Strom {} [A]"], [("Drehen", "°"), ("Schieben", "mm")], ["drehen", "schieben"], "i",
+    ),
+    "thesis": (
+        ["{} theta", "{} dtheta", "{} i"], [("hand roll",), ("hand pitch",), ("instrument slide",)],
+        ["hand_roll", "hand_pitch", "instrument_slide"], "i",
+    ),
+    "drives": (["Axis{}.ActPos", "Axis{}.ActVelo", "Axis{}.ActCurrent"], [("1",), ("2",)], ["joint_1", "joint_2"], "i"),
+    "only what is actual": (
+        ["{} actual", "{} current actual"], [("roll",), ("pitch",), ("slide",)],
+        ["hand_roll", "hand_pitch", "instrument_slide"], "i",
+    ),
+    "force of a joint": (["q_{}", "f_{}"], [("roll",), ("insertion",)], ["hand_roll", "instrument_slide"], "tau"),
+    "LabVIEW's own names": (["Untitled {}"], [(k,) for k in range(9)], ["joint_1", "joint_2", "joint_3"], "tau"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_names_that_laboratories_give_are_read_without_an_edit(tmp_path, kind):
+    templates, labels, joints, symbol = NAMES[kind]
+    names = [template.format(*label) for template in templates for label in labels]
+    n = len(joints)
+    t, q, dq = motion(n)
+    size = 0.2 * np.array([{"deg": 57.0, "°": 57.0, "mm": 1000.0}.get(label[-1], 1.0) for label in labels[:n]])
+    blocks = [size * q, size * dq, effort(q, dq)] if len(names) == 3 * n else [size * q, effort(q, dq)]
+    columns = dict(zip(names, np.column_stack(blocks).T.tolist(), strict=True))
+    if kind == "units that differ by joint":  # of which one is not told by its name
+        columns["Position joint 1 setpoint [deg]"] = columns[names[0]]
+    (tmp_path / "run.lvm").write_bytes(lvm([Write(columns, x=t.tolist())], Style(encoding="utf-8-sig")))
+    said = new(tmp_path / "run.lvm")
+    found, symbols = held(tmp_path), ["q", "dq", symbol] if len(names) == 3 * n else ["q", symbol]
+    places = [f"{joint}.{quantity}" for quantity in symbols for joint in joints]
+    assert found == {"time": "X_Value", **dict(zip(places, names, strict=True))}
+    slides = [joint.kind is Kind.PRISMATIC for joint in reading.read(tmp_path).robot.joints]
+    assert slides[-1] == (kind not in ("drives", "LabVIEW's own names"))
+    assert not any(slides[:-1])
+    assert ("CHECK: what its channels hold" in said) == (kind in ("LabVIEW's own names", "only what is actual"))
+
+
+@pytest.mark.parametrize(
+    ("scale", "told"),
+    [
+        (1.0, ""),
+        (57.3, "MISSING: the unit is deg or rad; in rad, its position reaches "),
+        (1e5, 'MISSING: the unit; its position reaches .*, as counts do: scale = <rad per count>, unit = "rad"'),
+    ],
+)
+def test_a_position_that_reaches_too_far_misses_its_unit_and_one_in_counts_its_scale(tmp_path, scale, told):
+    t, q, dq = motion(2)
+    sizes = 0.7 / np.abs(q[:, 0]).max(), 0.05 / np.abs(q[:, 1]).max()
+    header = "Time,Roll enc,Slide enc,Roll cur,Slide cur"
+    said = new(table(tmp_path / "run.csv", t, scale * q * sizes, effort(q, dq), header=header))
+    text = (tmp_path / "study.toml").read_text()
+    assert bool(re.search(f"Roll enc.*{told}", text)) if told else "MISSING" not in text
+    assert ("unit of Roll enc" in said) == bool(told)
+    slide = 'MISSING: the unit; its position reaches 5e+03, as counts do: scale = <m per count>, unit = "m"'
+    assert (slide in text) == (scale == 1e5)
 
 
 def test_three_joints_of_which_the_third_slides_are_of_the_arm_of_the_kit(tmp_path):

@@ -92,7 +92,8 @@ def arm_of(
     if beside:
         return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")
     said = next((word for word in DAVINCI_WORDS if word in words), "")
-    if all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
+    slides = any(2 in holding.moving for holding in counted)
+    if slides and all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
         name = "davinci" if current else "dvrk_psm"
         robot = robots.load(name, folder)
         count = "" if n == len(robot.joints) else f"; these are the first {len(robot.joints)} of {n}"
@@ -110,15 +111,18 @@ def arm_of(
 
 
 def _is_davinci(holding: Holding, is_named: bool) -> bool:
-    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third slides.
+    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third may slide.
 
     Three joints are as many as it has. More may be of any arm, unless names say which.
     """
     if holding.joints not in (POSITION_COUNTS if is_named else POSITION_COUNTS[:1]) or len(holding.ranges) < 3:
         return False
     (low, high), turning = holding.ranges[2], holding.ranges[:2]
-    slides = low >= -MAX_SLIDE and high <= MAX_SLIDE and high > low
-    return slides and all(least >= -MAX_TURN and most <= MAX_TURN for least, most in turning)
+    return (
+        low >= -MAX_SLIDE
+        and high <= MAX_SLIDE
+        and all(least >= -MAX_TURN and most <= MAX_TURN for least, most in turning)
+    )
 
 
 def _joint_names(holding: Holding) -> list[str]:
@@ -130,11 +134,12 @@ def _joint_names(holding: Holding) -> list[str]:
 
 def _prismatic(holdings: Sequence[Holding]) -> set[int]:
     """Joints whose positions or efforts are in units of length or force."""
-    meanings = [meaning for holding in holdings for meaning in holding.meanings.values()]
     return {
-        m.joint
-        for m in meanings
-        if m.symbol in ("q", "dq", "tau") and str(measures(m.unit)).startswith(("length", "force"))
+        meaning.joint
+        for holding in holdings
+        for name, meaning in holding.meanings.items()
+        if meaning.symbol in ("q", "dq", "tau")
+        and str(measures(holding.units.get(name) or meaning.unit)).startswith(("length", "force"))
     }
 
 

@@ -14,6 +14,7 @@ from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study.names import (
+    FORCE_WORDS,
     IN_DEGREES,
     INSERTION_WORDS,
     PROCESSED_WORDS,
@@ -25,6 +26,7 @@ from davinci_forces.study.names import (
     psm_joint,
     stated_unit,
     symbol_of,
+    without_unit,
     words_of,
 )
 from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
@@ -57,6 +59,7 @@ class Holding:
     repeats: bool = False
     steady: bool = False
     ranges: tuple[tuple[float, float], ...] = ()  # of the positions
+    units: dict[str, str] = field(default_factory=dict)  # that the log states, by name
     courses: dict[int, Course] = field(default_factory=dict, compare=False)  # of the moving joints
 
     def symbols(self) -> set[str]:
@@ -98,10 +101,11 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
         holding = max(by_numbers(numbers), by_words(numbers), key=lambda h: len(h.meanings))
     if holding.is_complete:
         return _read_motion(log, holding)
-    content = _by_content(log, [channel.name for channel in numbers])
+    content = _by_content(log, [channel.name for channel in numbers if channel.name != log.time])
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
         return content
-    if any(robot.file and len(robot.joints) == content.joints for robot in robots):
+    untold = not any(symbol_of(words_of(channel.name)) for channel in numbers)  # as of `Untitled 1`
+    if untold or any(robot.file and len(robot.joints) == content.joints for robot in robots):
         reasons = {name: f"CHECK: {m.reason.removeprefix('CHECK: ')}" for name, m in content.meanings.items()}
         return replace(content, meanings={n: replace(m, reason=reasons[n]) for n, m in content.meanings.items()})
     times = [channel.name for channel in numbers if is_time(channel)]
@@ -135,19 +139,26 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     of_the_kit = all(any(label & {*words} for words in named.values()) for label in (INSERTION_WORDS, {"yaw"}))
     of_the_kit |= any({"outer", "yaw"} <= {*words} for words in named.values())
     meanings: dict[str, Meaning] = {}
+    without_quantity: dict[int, str] = {}
     for channel in channels:
         words = named.get(channel.name, [])
         if of_the_kit:
             joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
         else:
             joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, channel.alias or channel.name)]
+        if len(joints) == 1 and {*words} <= {*words_of(robot.joints[joints[0]].name), *PROCESSED_WORDS}:
+            without_quantity.setdefault(joints[0], channel.name)
         # Beside a joint, a force is its effort; the force at the tip is none.
-        symbol = symbol_of(words) or (symbol_of(["tau", *words]) if "force" in words else "")
+        symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
         if len(joints) != 1 or not symbol:
             continue
         symbol = _side(symbol, words, channel, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
             meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name")
+    with_position = {m.joint for m in meanings.values() if m.symbol in POSITIONS}
+    for joint, name in without_quantity.items():  # `roll actual`, beside `roll current actual`
+        if joint not in with_position:
+            meanings[name] = Meaning("q", joint, "CHECK: position, as its name says no quantity")
     return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
 
 
@@ -205,7 +216,7 @@ def by_words(channels: Sequence[Channel]) -> Holding:
     """Assign joints by what names say beside the quantity, alike for positions and efforts: `base_pos`, `torqueA`."""
     named: dict[str, dict[str, str]] = {}
     for channel in channels:
-        words = words_of(channel.name)
+        words = words_of(without_unit(channel.name))
         if not is_time(channel) and (symbol := symbol_of(words)):
             label = "_".join(word for word in words if word not in SIGNAL_WORDS[symbol])
             named.setdefault(symbol, {}).setdefault(label, channel.name)
@@ -224,7 +235,7 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
     """Assign columns without names: a time, n positions, n velocities, and n efforts or currents."""
     if len(log.by_clock(names)) > 1:
         return Holding()
-    samples = samples_of(log, names)
+    samples = samples_of(log, names) | (samples_of(log, [log.time]) if log.time else {})
     first = None if has_clock(log) else columns.first_rising_column([samples[name] for name in names])
     signals = [name for i, name in enumerate(names) if i != first]
     blocks = columns.blocks([samples[name] for name in signals], None if first is None else samples[names[first]])
@@ -288,7 +299,7 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
         for name, m in holding.meanings.items()
     }  # fmt: skip
     return replace(
-        holding, meanings=meanings, timing=timing, moving=moving, courses=courses,
+        holding, meanings=meanings, timing=timing, moving=moving, courses=courses, units=units,
         repeats=again is not None and again.stop - again.start >= MIN_REPEATING_SHARE * len(q[joints[0]]),
         steady=velocity is not None and columns.is_steady(velocity),
         ranges=tuple((float(q[joint].min()), float(q[joint].max())) for joint in joints),

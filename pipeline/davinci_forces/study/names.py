@@ -14,11 +14,18 @@ from davinci_forces.maths.units import canonical, measures
 
 # Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
 SIGNAL_WORDS = {
-    "i": ("current", "currents", "amp", "i", "cur", "curr"),
-    "dq": ("velocity", "velocities", "speed", "speeds", "rate", "dq", "qd", "qdot", "vel", "omega"),
-    "tau": ("torque", "torques", "effort", "efforts", "tau", "eff", "trq", "moment", "moments"),
-    "q": ("position", "positions", "angle", "angles", "pos", "q", "theta", "ang"),
-}
+    "i": ("current", "currents", "amp", "i", "cur", "curr", "strom"),
+    "dq": (
+        "velocity", "velocities", "speed", "speeds", "rate", "dq", "qd", "qdot", "vel", "velo", "omega", "dtheta",
+        "geschwindigkeit", "winkelgeschwindigkeit", "drehzahl", "hastighed",
+    ),
+    "tau": ("torque", "torques", "effort", "efforts", "tau", "eff", "trq", "moment", "moments", "drehmoment"),
+    "q": (
+        "position", "positions", "angle", "angles", "pos", "q", "theta", "ang", "enc", "encoder", "winkel", "vinkel",
+        "weg",
+    ),
+}  # fmt: skip
+FORCE_WORDS = {"force", "f", "kraft"}  # of the effort of a joint, where the name names one
 COMMAND_WORDS = (
     "desired", "target", "setpoint", "command", "commanded", "reference", "goal", "ref", "des", "cmd", "sp", "demand",
     "demanded", "nominal", "soll", "asp", "asi", "servo",
@@ -52,6 +59,14 @@ class Numbered:
 def words_of(name: str) -> list[str]:
     """The words and numbers of a name, in lower case: `measuredJointPosition`, `actual_qd_0`."""
     return [word.lower() for word in WORD.findall(name)]
+
+
+def without_unit(name: str) -> str:
+    """A name, or its end, without the unit that ends it: joints that turn and that slide have other ones."""
+    bracket = re.search(r"\s*[\[({]([^\[\](){}]*)[\])}]\s*$", name)
+    if bracket and measures(canonical(bracket[1])):
+        return name[: bracket.start()]
+    return "" if measures(canonical(name.strip(" _"))) else name
 
 
 def stated_unit(channel: Channel) -> str:
@@ -89,7 +104,7 @@ def joint_groups(channels: Sequence[Channel]) -> list[Numbered]:
         keys = dict(_labels(channel))
         if keys and not is_time(channel):
             key = max(keys, key=lambda key: len(groups[key]))
-            chosen.setdefault(key, {})[keys[key]] = channel.name
+            chosen.setdefault(key, {}).setdefault(keys[key], channel.name)
     words = {key: _words(key) for key in chosen}
     signals = [Numbered(symbol_of(words[key]), names, tuple(words[key])) for key, names in chosen.items()]
     known = [group for group in signals if group.symbol]
@@ -116,7 +131,7 @@ def _labels(channel: Channel) -> Iterator[tuple[str, str]]:
         if len(parts) > 2 and part not in ("", "/", ".") and not symbol_of(words_of(part))
     ]  # fmt: skip
     for start, end in dict.fromkeys(spans):
-        yield f"{name[:start]}#{name[end:]}", name[start:end]
+        yield f"{name[:start]}#{without_unit(name[end:])}", name[start:end]
     yield name, ""
 
 

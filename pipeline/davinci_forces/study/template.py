@@ -27,6 +27,11 @@ from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.roles import Evidence, Role, roles_of
 from davinci_forces.study.timing import samples_of
 
+# Of joints: two units, and the farthest that a drive goes in both; beyond the second, a position is in counts.
+UNKNOWN_UNITS = {
+    Kind.REVOLUTE: ("rad", "deg", belonging.MAX_ANGLE_DRIVE, 3600.0),
+    Kind.PRISMATIC: ("m", "mm", 2.0, 2000.0),
+}
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
@@ -303,6 +308,8 @@ class _Writer:
         yield timing.remark
         yield from (f"unit of {name}" for name in self._unknown_units())
         joints, holding = self.robot.joints, self.draft.guess
+        if any(meaning.reason.startswith("CHECK") for meaning in holding.meanings.values()):
+            yield "CHECK: what its channels hold"
         lacking = {m.joint for m in holding.meanings.values()} - {*holding.joints_of_ranges()}
         yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
         yield from (f"joint of {name}" for name, symbol in self._without_joint().items() if symbol == "q")
@@ -351,16 +358,22 @@ class _Writer:
         names = [c.name for c in self.draft.log.channels if c.kind == "number" and c.name not in holding.meanings]
         return {name: symbol for name in names if (symbol := symbol_of(words_of(name)))}
 
-    def _unknown_units(self) -> set[str]:
-        """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
-        wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
-                if max(-low, high) > belonging.MAX_ANGLE_DRIVE}  # fmt: skip
+    def _unknown_units(self) -> dict[str, str]:
+        """Channels without a unit of joints that move farther than a drive, and which units they may have."""
+        holding, unknown = self.draft.guess, {}
+        reach = {k: max(-low, high) for k, (low, high) in zip(holding.joints_of_ranges(), holding.ranges, strict=True)}
         units = {channel.name: stated_unit(channel) for channel in self.draft.log.channels}
-        return {
-            name for name, m in self.draft.guess.meanings.items()
-            if m.joint in wide and m.symbol in ("q", "dq") and not m.unit and not units.get(name)
-            and m.joint < len(self.robot.joints) and self.robot.joints[m.joint].kind is Kind.REVOLUTE
-        }  # fmt: skip
+        for name, m in holding.meanings.items():
+            if m.symbol not in ("q", "dq") or m.unit or units.get(name) or m.joint >= len(self.robot.joints):
+                continue
+            rate, far = "/s" * (m.symbol == "dq"), reach.get(m.joint, 0.0)
+            unit, small, drive, in_small = UNKNOWN_UNITS[self.robot.joints[m.joint].kind]
+            if far > in_small:
+                counted = f'scale = <{unit}{rate} per count>, unit = "{unit}{rate}"'
+                unknown[name] = f"the unit; its position reaches {far:.3g}, as counts do: {counted}"
+            elif far > drive:
+                unknown[name] = f"the unit is {small}{rate} or {unit}{rate}; in {unit}, its position reaches {far:.3g}"
+        return unknown
 
     def _channels(self) -> Iterator[str]:
         """A line for each channel: what it is, with its unit and the reason, or a comment."""
@@ -380,7 +393,7 @@ class _Writer:
             elif channel.name in touching:
                 yield _touch_line(channel, touching[channel.name], channel.name in big)
             elif meaning:
-                yield self._meaning_line(channel, meaning, channel.name in unknown)
+                yield self._meaning_line(channel, meaning, unknown.get(channel.name, ""))
             elif channel.name == timing.time:
                 yield _time_line(channel, timing.size, timing.reason)
             elif channel.name == log.time:
@@ -395,7 +408,7 @@ class _Writer:
                 comment = f"  # {'; '.join(notes)}" if notes else ""
                 yield f'# "<joint>.{symbol or "<quantity>"}" = {_text(channel.name)}{comment}'
 
-    def _meaning_line(self, channel: Channel, meaning: Meaning, unit_unknown: bool) -> str:
+    def _meaning_line(self, channel: Channel, meaning: Meaning, unknown: str) -> str:
         """The line of a joint's channel; commented out where the joint does not move or is unknown."""
         if meaning.joint >= len(self.robot.joints):
             count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
@@ -405,10 +418,8 @@ class _Writer:
         unit = _fitting(meaning, joint, hides_unit=stated != channel.unit)
         value = f"{{ channel = {_text(channel.name)}, unit = {_text(unit)} }}" if unit else _text(channel.name)
         note = f"in {stated}" if stated else f"in {unit}" if unit else "no unit: SI"
-        if unit_unknown:
-            rate = "/s" if meaning.symbol == "dq" else ""
-            value = f'{{ channel = {_text(channel.name)}, unit = "" }}'
-            note = f"MISSING: the unit is deg{rate} or rad{rate}; the angle exceeds a turn if it is in rad"
+        if unknown:
+            value, note = f'{{ channel = {_text(channel.name)}, unit = "" }}', f"MISSING: {unknown}"
         line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
             if meaning.joint not in holding.joints_of_ranges():
