@@ -250,6 +250,46 @@ def test_names_that_laboratories_give_are_read_without_an_edit(tmp_path, kind):
 
 
 @pytest.mark.parametrize(
+    ("files", "joints"),
+    [
+        (("roll.lvm", "pitch.lvm"), ("hand_roll", "hand_pitch")),
+        (("roll/run.lvm", "slide/run.lvm"), ("hand_roll", "instrument_slide")),
+        (("joint1_a.lvm", "joint2_a.lvm"), ("joint_1", "joint_2")),
+        (("Motor 0.lvm", "Motor 1.lvm", "Motor 2.lvm"), ("joint_1", "joint_2", "joint_3")),
+        (("m1.lvm", "m2.lvm"), ("joint_1", "joint_1")),
+    ],
+)
+def test_where_each_file_has_one_joint_its_name_tells_which(tmp_path, files, joints):
+    for k, file in enumerate(files):
+        t, q, dq = motion(1, seed=k)
+        columns = {"Position (rad)": 0.1 * q, "Velocity (rad/s)": 0.1 * dq, "Current (A)": effort(q, dq)}
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        columns = {name: column[:, 0].tolist() for name, column in columns.items()}
+        (tmp_path / file).write_bytes(lvm([Write(columns, x=t.tolist())]))
+    said = new(tmp_path)
+    logs = {entry.files[0]: entry for entry in reading.read(tmp_path).logs}
+    for file, joint in zip(files, joints, strict=True):
+        found = {source.quantity: source.channel for source in logs[file].channels}
+        at_motor = "_m" * (joint == "instrument_slide")
+        assert found == {
+            "time": "X_Value", f"{joint}.{'theta' if at_motor else 'q'}{at_motor}": "Position (rad)",
+            f"{joint}.{'dtheta' if at_motor else 'dq'}{at_motor}": "Velocity (rad/s)", f"{joint}.i": "Current (A)",
+        }  # fmt: skip
+    assert "CHECK" not in said
+
+
+def test_a_log_of_one_joint_that_nothing_tells_is_to_be_checked_beside_logs_of_more(tmp_path):
+    t, q, dq = motion(2)
+    names = [f"{quantity} {joint}" for quantity in ("q", "tau") for joint in (1, 2)]
+    table(tmp_path / "both.csv", t, 0.1 * q, effort(q, dq), header=",".join(["t", *names]))
+    table(tmp_path / "one.csv", t, 0.1 * q[:, :1], effort(q, dq)[:, :1], header="t,q,tau")
+    said = new(tmp_path)
+    assert [line.count("CHECK: what its channels hold") for line in said.splitlines() if ".csv" in line] == [0, 1]
+    told = "# CHECK: which joint it is, as other logs are of more than one; by its name"
+    assert (tmp_path / "study.toml").read_text().count(told) == 2
+
+
+@pytest.mark.parametrize(
     ("scale", "told"),
     [
         (1.0, ""),

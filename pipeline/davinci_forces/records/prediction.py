@@ -57,8 +57,9 @@ class Prediction(LogJointRecord):
 
 
 class PathShare(LogJointRecord):
-    """How new a joint's motion is: the share of its path that no other identification log follows, its speed over that
-    of the fastest of these logs, and the share of time in motion.
+    """The share of a joint's path that no other identification log follows, and the share of time in motion.
+
+    Also its speed over that of the fastest identification log.
     """
 
     PUBLISHED = ("path.{log}.{joint}: path_new speed_ratio moving",)

@@ -21,7 +21,7 @@ from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import Holding, Meaning, with_motion
+from davinci_forces.study.guessing import JOINT_NUMBER, Holding, Meaning, by_file_name, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
 from davinci_forces.toml import TomlFile, TomlTable
@@ -34,6 +34,7 @@ MAX_TURN = 1.6  # [rad] within which the hand turns
 DAVINCI_WORDS = ("davinci", "dvrk", "psm")
 OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
 MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way; a drive that turns farther may be in degrees
+UNCLEAR_JOINT = "which joint it is, as other logs are of more than one"
 HARMONICS = 12  # more than an excitation usually has: too few distort the motion, too many keep a little noise
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
 OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
@@ -68,6 +69,25 @@ def candidates(folder: Path) -> tuple[list[Arm], list[str]]:
     return [*arms, *(Arm(name, robots.load(name, folder), "") for name in robots.ROBOTS)], why_not
 
 
+def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms: Sequence[Arm]) -> list[Holding]:
+    """Assign the joint of each log of one joint by the name of its file and folders, where no channel tells it.
+
+    Where that does not tell it either, the joint is to be checked if other logs tell of more than one.
+    """
+    numbers = [int(found[1]) for name in names for found in JOINT_NUMBER.finditer(name)]
+    robots, first = [arm.robot for arm in arms], 0 if 0 in numbers else 1
+    untold = [holding.joints == 1 and not holding.has_named_joints for holding in holdings]
+    assigned = [
+        by_file_name(holding, name, robots, first) if lone else holding
+        for holding, name, lone in zip(holdings, names, untold, strict=True)
+    ]
+    several = any(holding.joints > 1 for holding in assigned)
+    return [
+        holding.to_check(UNCLEAR_JOINT) if several and lone and not holding.has_named_joints else holding
+        for holding, lone in zip(assigned, untold, strict=True)
+    ]
+
+
 def arm_of(
     holdings: Sequence[Holding], folder: Path, names: Sequence[str], arms: Sequence[Arm], why_not: Sequence[str]
 ) -> Arm:
@@ -86,7 +106,7 @@ def arm_of(
         if any(holding.robot == arm.robot for holding in counted):
             if arm.name == DEFAULT_ROBOT and of_the_kit:  # the kit's joints have the same names
                 arm = Arm("dvrk_psm", robots.load("dvrk_psm", folder), "")
-            return arm._replace(reason=arm.reason or "by the joints in channel names")
+            return arm._replace(reason=arm.reason or "by the joints in the names of channels or files")
     n = max(holding.joints for holding in counted)
     beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
     if beside:

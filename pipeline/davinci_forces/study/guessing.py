@@ -33,6 +33,9 @@ from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, name
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
+BY_NUMBER = "by the number in its name"
+BY_FILE = "by the joint in its file's name"
+JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
 POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i")
 
 
@@ -79,6 +82,17 @@ class Holding:
             moving=tuple(sorted(joints[k] for k in self.moving)), ranges=tuple(self.ranges[i] for i in order),
             courses={joints[k]: course for k, course in self.courses.items()},
         )  # fmt: skip
+
+    def to_check(self, what: str) -> "Holding":
+        """The same with something to be checked of each channel."""
+        meanings = {n: replace(m, reason=f"CHECK: {what}; {m.reason}") for n, m in self.meanings.items()}
+        return replace(self, meanings=meanings)
+
+    @property
+    def has_named_joints(self) -> bool:
+        """Whether names tell the joints."""
+        by_name = {meaning.reason for meaning in self.meanings.values()} & {BY_FILE, BY_NUMBER}
+        return self.robot is not None or any(self.labels) or bool(by_name)
 
     @property
     def is_complete(self) -> bool:
@@ -162,6 +176,29 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
 
 
+def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: int) -> Holding:
+    """Assign the one joint of a log, whose channels do not tell which it is, by the name of its file and folders.
+
+    Numbers of joints in names count from `first`.
+    """
+    words, number = words_of(name), JOINT_NUMBER.search(name)
+    for robot in robots:
+        joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, name)]
+        if len(joints) == 1:
+            named, [k] = holding.with_joints(joints), joints
+            slides = robot.joints[k].kind is Kind.PRISMATIC
+            at_motor = {n for n, m in named.meanings.items() if slides and _is_angle(holding.units.get(n, ""))}
+            meanings = {
+                n: replace(m, symbol=AT_MOTOR.get(m.symbol, m.symbol) if n in at_motor else m.symbol, reason=BY_FILE)
+                for n, m in named.meanings.items()
+            }
+            return replace(named, joints=len(robot.joints), meanings=meanings, robot=robot, labels=())
+    if number and int(number[1]) >= first:
+        holding = replace(holding.with_joints([int(number[1]) - first]), labels=())
+        return replace(holding, meanings={n: replace(m, reason=BY_FILE) for n, m in holding.meanings.items()})
+    return holding
+
+
 def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
     """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
     with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
@@ -170,9 +207,13 @@ def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
 
 def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> str:
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    unit = measures(canonical(channel.unit))
-    motor = "motor" in words or (unit == "angle" and joint.kind is Kind.PRISMATIC)
+    motor = "motor" in words or (_is_angle(channel.unit) and joint.kind is Kind.PRISMATIC)
     return AT_MOTOR.get(symbol, symbol) if motor else symbol
+
+
+def _is_angle(unit: str) -> bool:
+    """Whether a unit is of an angle or its rate."""
+    return str(measures(canonical(unit))).startswith("angle")
 
 
 def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
@@ -200,7 +241,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
         usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(group.words) else ""
         for label, name in group.names.items():
             if label.isdecimal() and len(numbers) == len(labels):
-                joint, reason = int(label) - first, "by the number in its name"
+                joint, reason = int(label) - first, BY_NUMBER
             elif label in labels:
                 joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
             else:

@@ -41,6 +41,7 @@ PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "meas
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
 TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
+PARTS = re.compile(r"([/.])(?![^\[({]*[\])}])")  # not the slash of `speed (rad/s)`
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 # Joints of the da Vinci Research Kit by its own labels, of which those of the slide are usual for any da Vinci arm.
 INSERTION_WORDS = {"insertion", "ins"}
@@ -113,7 +114,7 @@ def joint_groups(channels: Sequence[Channel]) -> list[Numbered]:
 
 def _words(key: str) -> list[str]:
     """The words of a name without the joint: those of its last part with a symbol, and commands of any part."""
-    parts = [words_of(part) for part in re.split(r"[/.]", key)]
+    parts = [words_of(part) for part in PARTS.split(key)]
     last = next((words for words in reversed(parts) if symbol_of(words)), [])
     marking = {*COMMAND_WORDS, *OTHER_WORDS, *IN_DEGREES}
     return last + [word for words in parts for word in words if word in marking]
@@ -124,7 +125,7 @@ def _labels(channel: Channel) -> Iterator[tuple[str, str]]:
     name = channel.name
     digits = [m.span() for m in re.finditer(r"\d+", name)]
     spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + digits[::-1]
-    parts = re.split(r"([/.])", name)
+    parts = PARTS.split(name)
     ends = [sum(map(len, parts[: k + 1])) for k in range(len(parts))]
     spans += [
         (ends[k] - len(part), ends[k]) for k, part in enumerate(parts)

@@ -119,13 +119,16 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
+    texts = [draft.files[0].resolve().relative_to(folder.resolve()).as_posix() for draft in drawn]
+    guesses = belonging.with_joints_of_files([draft.guess for draft in drawn], texts, arms)
+    drawn = [replace(draft, guess=holding) for draft, holding in zip(drawn, guesses, strict=True)]
     channels = [channel.alias or channel.name for draft in drawn for channel in draft.log.channels]
     names = [folder.resolve().name, *(file.name for file in files), *channels]
     arm = stated[0] if stated else belonging.arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
     drawn = _named_as(arm.robot, drawn)
-    roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
-    blocks, rows = [], []
     named = [*_distinct(drawn)]
+    roles = roles_of([_recording(draft, name, folder, arm.robot) for draft, name in named])
+    blocks, rows = [], []
     for (draft, name), role in zip(named, roles, strict=True):
         tare = "" if role.tare is None else named[role.tare][1]
         writer = _Writer(draft, name, folder, arm.robot, role, tare)
@@ -167,11 +170,11 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) else {})
 
 
-def _recording(draft: DraftLog, folder: Path, robot: Robot) -> Evidence:
+def _recording(draft: DraftLog, name: str, folder: Path, robot: Robot) -> Evidence:
     path = draft.files[0].resolve().relative_to(folder.resolve())
     moving = [robot.joints[k].kind for k in draft.guess.moving if k < len(robot.joints)]
     text = (path.parent / draft.files[0].name.partition(".")[0]).as_posix()
-    return Evidence(draft.name, text, draft.guess, bool(draft.touching), Kind.PRISMATIC in moving)
+    return Evidence(name, text, draft.guess, bool(draft.touching), Kind.PRISMATIC in moving)
 
 
 def _distinct(drawn: Sequence[DraftLog]) -> Iterator[tuple[DraftLog, str]]:
