@@ -70,9 +70,10 @@ def test_inspect_and_new_show_them_and_their_json_and_toml_hold_them(hostile):
     names = [channel["name"] for channel in json.loads(said("inspect", log, "--json"))["channels"]]
     assert f"group{HOSTILE}/q{HOSTILE}" in names
     printed = said("new", log, "--print")
-    assert "log" not in tomllib.loads(printed)  # nobody knows such quantities, so the log is a comment
-    [line] = [line.removeprefix("# ") for line in printed.splitlines() if line.startswith("# file = ")]
-    assert tomllib.loads(line)["file"] == log.name
+    [drafted] = tomllib.loads(printed)["log"]
+    assert drafted["file"] == log.name
+    assert set(names) > set(drafted["channels"].values())
+    assert "CHECK: position 1 of 1" in printed  # by its values, as nobody knows such names
 
 
 @pytest.mark.medium
