@@ -318,6 +318,14 @@ def test_three_joints_of_which_the_third_slides_are_of_the_arm_of_the_kit(tmp_pa
     assert not (tmp_path / "robot.toml").exists()
 
 
+@pytest.mark.parametrize(("unit", "robot"), [("m", "davinci"), ("rad", "robot.toml")])
+def test_a_third_joint_whose_unit_is_of_an_angle_does_not_slide(tmp_path, unit, robot):
+    t, q, dq = motion(3)
+    names = [f"Encoder {k} [{unit if k == 3 else 'rad'}]" for k in (1, 2, 3)] + [f"Current {k} [A]" for k in (1, 2, 3)]
+    new(table(tmp_path / "run.csv", t, q * [0.2, 0.2, 0.03], effort(q, dq), header=",".join(["Time [s]", *names])))
+    assert reading.read(tmp_path).robot.file == robot * robot.endswith("toml")
+
+
 def test_a_robot_file_is_taken_where_it_fits_and_never_overwritten(tmp_path):
     t, q, dq = motion(4)
     file = table(tmp_path / "run.csv", t, q, dq, effort(q, dq))

@@ -21,7 +21,7 @@ from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import JOINT_NUMBER, Holding, Meaning, by_file_name, with_motion
+from davinci_forces.study.guessing import JOINT_NUMBER, Holding, Meaning, by_file_name, is_angle, with_motion
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
 from davinci_forces.toml import TomlFile, TomlTable
@@ -136,6 +136,8 @@ def _is_davinci(holding: Holding, is_named: bool) -> bool:
     Three joints are as many as it has. More may be of any arm, unless names say which.
     """
     if holding.joints not in (POSITION_COUNTS if is_named else POSITION_COUNTS[:1]) or len(holding.ranges) < 3:
+        return False
+    if any(m.joint == 2 and is_angle(holding.units.get(name, "")) for name, m in holding.meanings.items()):
         return False
     (low, high), turning = holding.ranges[2], holding.ranges[:2]
     return (

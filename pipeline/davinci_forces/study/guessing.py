@@ -187,7 +187,7 @@ def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: in
         if len(joints) == 1:
             named, [k] = holding.with_joints(joints), joints
             slides = robot.joints[k].kind is Kind.PRISMATIC
-            at_motor = {n for n, m in named.meanings.items() if slides and _is_angle(holding.units.get(n, ""))}
+            at_motor = {n for n, m in named.meanings.items() if slides and is_angle(holding.units.get(n, ""))}
             meanings = {
                 n: replace(m, symbol=AT_MOTOR.get(m.symbol, m.symbol) if n in at_motor else m.symbol, reason=BY_FILE)
                 for n, m in named.meanings.items()
@@ -207,11 +207,11 @@ def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
 
 def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> str:
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    motor = "motor" in words or (_is_angle(channel.unit) and joint.kind is Kind.PRISMATIC)
+    motor = "motor" in words or (is_angle(channel.unit) and joint.kind is Kind.PRISMATIC)
     return AT_MOTOR.get(symbol, symbol) if motor else symbol
 
 
-def _is_angle(unit: str) -> bool:
+def is_angle(unit: str) -> bool:
     """Whether a unit is of an angle or its rate."""
     return str(measures(canonical(unit))).startswith("angle")
 
