@@ -1,10 +1,11 @@
 """Compute sample times of evenly sampled channels from headers of files or blocks, and group channels by clock."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
+from functools import partial
 
 import numpy as np
 
@@ -56,8 +57,6 @@ class Timeline:
         begin, end = bisect_right(self.first, row) - 1, bisect_right(self.first, row + count - 1)
         first, start, step = (np.array(column[begin:end]) for column in (self.first, self.start, self.step))
         rows = row + np.arange(count)
-        if len(first) == 1:
-            return np.asarray(start[0] + (rows - first[0]) * step[0])
         part = np.searchsorted(first, rows, side="right") - 1
         return np.asarray(start[part] + (rows - first[part]) * step[part])
 
@@ -119,41 +118,37 @@ class OwnClock:
 
 def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has_x_columns: bool) -> list[list[str]]:
     """Split groups in which a second header states different clocks for the channels; add channels without a group."""
-    split: list[list[str]] = []
-    for group in groups:
-        parts: list[list[str]] = []
-        for name in group:
-            _add_to_group(parts, name, sampled, has_x_columns)
-        split += parts
-    for name in [n for n in sampled if not any(n in group for group in groups)]:
-        _add_to_group(split, name, sampled, has_x_columns)
-    return split
 
-
-def _add_to_group(groups: list[list[str]], name: str, sampled: dict[str, Sampling], has_x_columns: bool) -> None:
-    """Add a channel to the first group with its clock; a channel that the header omits may have any clock."""
-    for group in groups:
+    def is_like(group: list[str], name: str) -> bool:  # a channel that the header omits may have any clock
         member_sampling = next((sampled[member] for member in group if member in sampled), None)
-        if not (member_sampling and name in sampled) or member_sampling.is_like(sampled[name], has_x_columns):
-            group.append(name)
-            return
-    groups.append([name])
+        return not (member_sampling and name in sampled) or member_sampling.is_like(sampled[name], has_x_columns)
+
+    split = [part for group in groups for part in _grouped(group, is_like, [])]
+    return _grouped([name for name in sampled if not any(name in group for group in groups)], is_like, split)
+
+
+def _grouped(
+    names: Sequence[str], is_like: Callable[[list[str], str], bool], groups: list[list[str]]
+) -> list[list[str]]:
+    """Add each name to the first of the groups that is like it, else as a new group."""
+    for name in names:
+        group = next((group for group in groups if is_like(group, name)), None)
+        if group is None:
+            groups.append(group := [])
+        group.append(name)
+    return groups
 
 
 def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
     """Group columns that are equal in all rows, such as the times of one clock; missing values count as equal."""
     groups = [[*names]]
     for block in blocks:
-        split: list[list[str]] = []
-        for group in groups:
-            parts: list[list[str]] = []
-            for name in group:
-                same = (part for part in parts if np.array_equal(block[part[0]], block[name], equal_nan=True))
-                if (part := next(same, None)) is None:
-                    parts.append(part := [])
-                part.append(name)
-            split += parts
-        groups = split
+        is_equal = partial(_is_equal, block)
+        groups = [part for group in groups for part in _grouped(group, is_equal, [])]
         if len(groups) == len(names):
             break
     return groups
+
+
+def _is_equal(block: Block, group: list[str], name: str) -> bool:
+    return np.array_equal(block[group[0]], block[name], equal_nan=True)
