@@ -11,7 +11,7 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog, install
 from davinci_forces.files import require_file
-from davinci_forces.logs.isolated.process import Answer, ChildEnded, Message, answers
+from davinci_forces.logs.isolated.process import REMEDY, Answer, ChildEnded, Message, answers
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
 
 SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
@@ -20,7 +20,6 @@ BYTES_PER_CPU_SECOND = 2e5  # in all: a tenth of the rate for short messages of 
 MEMORY = 448 << 20  # [bytes] of a child; plus `MEMORY_PER_BYTE` of the file, up to `MAX_MEMORY`
 MEMORY_PER_BYTE = 4
 MAX_MEMORY = 4 << 30
-REMEDY = "it is damaged; record it again, or take it out of study.toml"
 MAX_COMPRESSION = 2000  # size of the samples over that of the file, at most; the best compression reaches 1000
 HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hold a few samples
 
@@ -89,21 +88,10 @@ def _answers(path: Path, request: Message) -> Iterator[Answer]:
         for message, columns in answers(request):
             if "bad" in message:
                 # Read to the end, so that the child can be used again; closing the generator would end it.
-                problem = _problem(path, request, message)
+                problem = message["bad"].replace(request["path"], str(path))
                 continue
             yield message, columns
     except ChildEnded as why:
         raise BadLog(f"{path}: reading it {why}, so it is not read: {REMEDY}") from None
     if problem:
         raise BadLog(problem)
-
-
-def _problem(path: Path, request: Message, message: Message) -> str:
-    if message.get("memory"):
-        most = request["memory"] >> 20
-        return (
-            f"{path}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one piece: save "
-            "it in a format that is read piece by piece, such as MATLAB's -v7.3"
-        )
-    text = str(message["bad"]).replace(request["path"], str(path))
-    return f"{path}: it cannot be read ({text}): {REMEDY}" if message.get("fault") else text

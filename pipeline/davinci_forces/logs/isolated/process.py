@@ -21,6 +21,7 @@ from davinci_forces.maths.arrays import Array
 Message = dict[str, Any]
 Answer = tuple[Message, list[Array]]
 
+REMEDY = "it is damaged; record it again, or take it out of study.toml"
 MAX_WAITING = 2  # children kept for the next log: starting one takes longer than reading a small file
 START = "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated.process import serve; serve()"
 OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not have
@@ -191,10 +192,15 @@ def _answer(request: Message, answers: IO[bytes]) -> None:
         send(answers, {"bad": str(error)})
     except MemoryError:
         _opened.clear()
-        send(answers, {"bad": "", "memory": True})
+        most = request["memory"] >> 20
+        bad = (
+            f"{request['path']}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one "
+            "piece: save it in a format that is read piece by piece, such as MATLAB's -v7.3"
+        )
+        send(answers, {"bad": bad})
     except Exception as error:
         _opened.clear()
-        send(answers, {"bad": f"{type(error).__name__}: {error}", "fault": True})
+        send(answers, {"bad": f"{request['path']}: it cannot be read ({type(error).__name__}: {error}): {REMEDY}"})
 
 
 def _answers(request: Message) -> Iterator[Answer]:
