@@ -54,7 +54,7 @@ class Channels:
         return valid
 
     def complete(self, sources: tuple[Source, ...]) -> None:
-        """Check that every joint has one position and one effort."""
+        """Check that every joint has one position and one effort, and every vector all of its components or none."""
         for joint in dict.fromkeys(s.joint for s in sources if s.joint):
             has = {s.symbol for s in sources if s.joint == joint}
             for (first, second), needed in ALTERNATIVES:
@@ -62,16 +62,13 @@ class Channels:
                     self.log.problem(f"{joint} has no {needed}; give {joint}.{first} or {joint}.{second}")
                 if {first, second} <= has:
                     self.log.problem(f"{joint} has both {first} and {second}; leave one out")
-        self.complete_vectors({s.quantity for s in sources})
-        if self.log.values.get("role") == "tissue":
-            self.complete_tissue(sources)
-
-    def complete_vectors(self, has: set[str]) -> None:
-        """Check that a position or a force has all of its components or no component."""
+        quantities = {s.quantity for s in sources}
         for names in (TIP, FORCE):
-            missing = [name for name in names if name not in has]
+            missing = [name for name in names if name not in quantities]
             if missing and len(missing) < len(names):
                 self.log.problem(f"{', '.join(names)} belong together; give {' and '.join(missing)}, too")
+        if self.log.values.get("role") == "tissue":
+            self.complete_tissue(sources)
 
     def complete_tissue(self, sources: tuple[Source, ...]) -> None:
         """Check that a tissue log has a depth and a force, as channels or by a prismatic joint."""
