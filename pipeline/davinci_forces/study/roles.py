@@ -202,15 +202,12 @@ def _with_identification(recordings: Sequence[Evidence], roles: list[Role]) -> l
 
 def _with_tares(recordings: Sequence[Evidence], roles: list[Role]) -> list[Role]:
     """Give each weight log the free motion of the same joints that is named as without the mass, nearest in range."""
-    empty = [i for i, role in enumerate(roles) if role.role == "validation" and _word(recordings[i].path)[0] == "empty"]
+    reach = [_spans(recording.holding) for recording in recordings]
+    moving = [i for i, role in enumerate(roles) if role.role == "validation" and recordings[i].holding.moving]
+    empty = [i for i in moving if _word(recordings[i].path)[0] == "empty"]
     for k, role in enumerate(roles):
-        spans = _spans(recordings[k].holding)
-        same = {i: _spans(recordings[i].holding) for i in empty if recordings[i].holding.moving}
-        apart = {
-            i: sum(abs(x - spans[j]) for j, x in other.items())
-            for i, other in same.items()
-            if other.keys() == spans.keys()
-        }
-        if role.role == "weight" and apart:
-            roles[k] = role._replace(tare=min(apart, key=lambda i: apart[i]))
+        same = [i for i in empty if reach[i].keys() == reach[k].keys()]
+        if role.role == "weight" and same:
+            tare = min(same, key=lambda i: sum(abs(x - reach[k][j]) for j, x in reach[i].items()))
+            roles[k] = role._replace(tare=tare)
     return roles
