@@ -8,7 +8,7 @@ from typing import Any
 from davinci_forces.errors import BadRobot
 from davinci_forces.logs.log import Channel
 from davinci_forces.maths.units import UNITS, canonical, measures
-from davinci_forces.robots import Kind, Robot
+from davinci_forces.robots import Joint, Kind, Robot
 from davinci_forces.study import Source
 from davinci_forces.toml import TomlTable, excerpt
 
@@ -110,14 +110,16 @@ class Channels:
         if self.robot is None:
             return None
         try:
-            kind, effort_in = self.robot.joint(joint).kind, self.robot.joint(joint).effort
+            return kind_of_unit(self.robot.joint(joint), symbol)
         except BadRobot as error:
             self.log.problem(str(error), *keys)
             return None
-        position, effort = ("angle", "torque") if kind is Kind.REVOLUTE else ("length", "force")
-        if effort_in:
-            effort = str(measures(effort_in))
-        return OF_A_JOINT[symbol].format(position=position, effort=effort)
+
+
+def kind_of_unit(joint: Joint, symbol: str) -> str:
+    """What the unit of a quantity of a joint measures."""
+    position, effort = ("angle", "torque") if joint.kind is Kind.REVOLUTE else ("length", "force")
+    return OF_A_JOINT[symbol].format(position=position, effort=measures(joint.effort) or effort)
 
 
 def _unit(table: TomlTable, needed: str) -> str:

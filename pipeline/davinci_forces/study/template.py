@@ -20,7 +20,7 @@ from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import belonging
 from davinci_forces.study.belonging import Arm
-from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG, force_sensor, is_tissue, tissue_channels, unit_of
+from davinci_forces.study.channels import OF_THE_LOG, force_sensor, is_tissue, kind_of_unit, tissue_channels, unit_of
 from davinci_forces.study.entries import ROLES, is_inside
 from davinci_forces.study.guessing import Holding, Meaning, guess
 from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
@@ -438,9 +438,7 @@ def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
 
     `hides_unit`: the log takes a label for the unit, so that the unit has to be stated.
     """
-    at_motor = meaning.symbol.endswith("_m")
-    position, effort = ("angle", "torque") if at_motor or joint.kind is Kind.REVOLUTE else ("length", "force")
-    needed = OF_A_JOINT[meaning.symbol].format(position=position, effort=measures(joint.effort) or effort)
+    needed = kind_of_unit(joint, meaning.symbol)
     units = (meaning.unit, f"{meaning.unit}/s", SI[needed] if hides_unit else "")
     return next((unit for unit in units if measures(unit) == needed), "")
 
