@@ -124,9 +124,7 @@ class ArrowLog(Log):
             if episodes:
                 values[EPISODES[0]] = episodes.times(*(values[column] for column in EPISODES))
             cells = {name: self.columns[name] for name in names}
-            block = {
-                n: values[c] if p is None else np.ascontiguousarray(values[c][:, p]) for n, (c, p) in cells.items()
-            }
+            block = {n: values[c] if p is None else values[c][:, p].copy() for n, (c, p) in cells.items()}
             if batch.num_rows:
                 yield self.count_nans(block, {name: arrays[column].null_count for name, (column, _) in cells.items()})
 

@@ -59,12 +59,8 @@ def _require_decimal_mark(cells: Sequence[Sequence[str]], mark: str) -> None:
 
 def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int, bool, int]:
     """Count the lines that are mostly numbers; whether they are so throughout; count the numbers in them."""
-    numbers = [len(cells) - [*map(number.fullmatch, cells)].count(None) for cells in body]
-    good = [
-        (count, len([*filter(None, row)]))
-        for count, row in zip(numbers, body, strict=True)
-        if count and _are_mostly(count, row)
-    ]
+    counted = [(len(row) - [*map(number.fullmatch, row)].count(None), row) for row in body]
+    good = [(count, len([*filter(None, row)])) for count, row in counted if count and _are_mostly(count, row)]
     return len(good), all(count == cells for count, cells in good), sum(count for count, _ in good)
 
 
