@@ -97,7 +97,7 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
     """
     per_sample = slope_of(pairs)
     if has_clock(log):
-        return _timing_of_format(log, samples, pairs, per_sample)
+        return _timing_of_format(log, samples, per_sample)
     numbers = [c for c in log.channels if c.kind == "number" and not c.derived and c.name in samples]
     times = [channel for channel in numbers if is_time(channel) and _rises(samples[channel.name])]
     times.sort(key=lambda channel: "header" not in words_of(channel.name))  # when it was measured, not received
@@ -165,9 +165,7 @@ def _timing_agreed(timing: TimeGuess, slope: VelocityRatio | None, rate: float, 
     return TimeGuess(missing=f"{clash}: write rate = {fitted:g}, or time = {name!r}", step=timing.step)
 
 
-def _timing_of_format(
-    log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], slope: VelocityRatio | None
-) -> TimeGuess:
+def _timing_of_format(log: Log, samples: Mapping[str, Array], slope: VelocityRatio | None) -> TimeGuess:
     """The clock of a format, with a remark where the velocities tell another rate."""
     t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
     step = log.clock.step if log.clock else _step(t) if len(t) > 1 else 0.0
