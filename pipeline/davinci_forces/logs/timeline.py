@@ -39,18 +39,13 @@ class Timeline:
 
         A new part begins if the samples do not follow the last one directly, or if their sampling time is another.
         """
-        due = self.due
+        due = self.start[-1] + (self.rows - self.first[-1]) * self.step[-1] if self.first else 0.0
         continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not continues or step != self.step[-1]:
             self.first.append(self.rows)
             self.start.append(due if continues or start is None else start)
             self.step.append(step)
         self.rows += rows
-
-    @property
-    def due(self) -> float:
-        """Time at which the next sample is due [s]; 0 before the first."""
-        return self.start[-1] + (self.rows - self.first[-1]) * self.step[-1] if self.first else 0.0
 
     def times(self, row: int, count: int) -> Array:
         """Compute the times (count,) [s] of the samples from a row on; times after the last sample are extrapolated."""
