@@ -1,6 +1,7 @@
 """Run the stages on studies: find their folders and logs, run, and print the results."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from glob import glob
 from pathlib import Path
@@ -36,17 +37,15 @@ def studies(names: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[
     folders = sorted(file.parent for file in Path("raw").glob("*/study.toml"))
     if not folders:
         raise BadStudy("raw/ holds no study; write one with `davinci-forces new raw/<study>/<log>`")
+    skipped: dict[str, list[Path]] = {}
     for folder in folders:
-        try:
+        with suppress(BadStudy):  # its run prints the error
             study = reading.read(folder)
-        except BadStudy:  # its run prints the error
-            yield folder
-            continue
-        absent = study.absent()
-        if len(absent) < study.files:
-            yield folder
-        elif verbosity != "quiet":
-            echo(f"{folder}: skipped, its logs are missing ({absent[0]} ...); {_source(study)}")
+            if len(study.absent()) == study.files:
+                skipped.setdefault(_source(study), []).append(folder)
+    for source, absent in skipped.items() if verbosity != "quiet" else ():
+        echo(f"{', '.join(map(str, absent))}: skipped, as none of their logs is here; {source}")
+    yield from (folder for folder in folders if not any(folder in absent for absent in skipped.values()))
 
 
 def _source(study: Study) -> str:
@@ -56,7 +55,7 @@ def _source(study: Study) -> str:
     name = study.folder.name
     if study.simulated and name in shipped_scenarios():
         return f"`davinci-forces simulate {name} {study.folder}` writes them"
-    return "study.toml says where to get them"
+    return "the study.toml of each says where to get them"
 
 
 def expand_pattern(name: Path) -> list[Path]:
