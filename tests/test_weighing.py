@@ -15,10 +15,12 @@ from davinci_forces.maths.contact.weighing import (
     Rows,
     agreement,
     better,
+    error_between,
     fit_mass,
     offset,
     pooled_std,
     scaled_constant,
+    spread_between,
     unit_load,
     widening_factor,
 )
@@ -92,6 +94,35 @@ def test_intervals_hold_the_mass_where_what_the_model_leaves_is_as_slow_as_a_par
     assert 0.90 < held / draws < 0.99
 
 
+def test_noise_slower_than_a_part_of_the_path_is_in_the_error_between_periods():
+    """Noise correlated over half a path, on a load that hardly varies: the jackknife alone holds far too few."""
+    rng, x, K, n = np.random.default_rng(3), np.full(60, 9.81), 60, 5
+    kernel, off, of_path = np.ones(K // 2) / np.sqrt(K // 2), [], []
+    for _ in range(300):
+        runs = []
+        for _ in range(3):  # whose spreads are pooled
+            noise = np.convolve(rng.normal(size=n * K + K // 2 - 1), kernel, mode="valid")
+            runs.append([rows(x, 0.2 * x + noise[p * K : (p + 1) * K]) for p in range(n)])
+        path = fit_mass([rows(x, np.mean([period.y for period in runs[0]], axis=0))])
+        std = error_between([(n, spread_between(run)) for run in runs], n)
+        off.append((path.mass - 0.2) / max(std, path.std))
+        of_path.append((path.mass - 0.2) / path.std)
+    assert 0.93 < np.mean(np.abs(off) < 1.96) < 0.985
+    assert np.mean(np.abs(of_path) < 1.96) < 0.85
+
+
+def test_few_periods_tell_no_spread():
+    x = np.sin(2 * np.pi * np.arange(60) / 60)
+    assert spread_between([rows(x, x)]) == 0.0
+    assert error_between([(1, 0.0), (0, 0.0)], 1) == 0.0
+    two = [rows(x, x), rows(x, 3.0 * x)]
+    assert spread_between(two) == pytest.approx(np.sqrt(2.0))
+    assert error_between([(2, 3.0), (2, 3.0)], 2) == 0.0
+    assert error_between([(2, 3.0), (1, 0.0), (3, 0.0)], 4) == pytest.approx(
+        np.sqrt(9 / 3 / 4) * 3.182 / 1.96, rel=1e-3
+    )
+
+
 def test_masses_of_free_motion_that_exceed_their_errors_widen_them_and_others_do_not_narrow_them():
     assert widening_factor([MassEstimate(0.03, 0.01), MassEstimate(0.03, 0.01)], 0.0) == pytest.approx(3.0)
     assert widening_factor([MassEstimate(0.03, 0.01)], 0.02) == pytest.approx(3.0 / np.sqrt(5.0))
@@ -153,10 +184,17 @@ def left_by_the_model(t, seed):
     return np.array([0.05, 0.1, 0.1]) * slow + 0.05 * np.random.default_rng(len(t)).normal(size=slow.shape)
 
 
-def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T, false=0.0):
-    """Models and motions of one log; `hung` says what truly hangs, `false` the mass that roll alone shows more."""
+def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T, false=0.0, drift=0.0):
+    """Models and motions of one log; `hung` says what truly hangs, `false` the mass that roll alone shows more.
+
+    `drift` is the size of noise that is correlated over a quarter of the period.
+    """
     q, dq, ddq = motion(path, t)
     tau = left_by_the_model(t, seed) + day
+    if drift:
+        width = round(0.25 * PERIOD * RATE)
+        white = np.random.default_rng([seed, *name.encode()]).normal(size=(len(t) + width - 1, 3)) / np.sqrt(width)
+        tau += drift * np.stack([np.convolve(x, np.ones(width), mode="valid") for x in white.T], axis=1)
     tau[:, 0] += false * unit_load(ROBOT.chain, "end_link", HUNG.position, q, dq, ddq)[:, 0]
     if hung is not None:
         tau = tau + MASS * unit_load(ROBOT.chain, "end_link", hung, q, dq, ddq)
@@ -220,6 +258,22 @@ def test_a_hung_mass_is_found_within_its_interval():
         assert weight.mass_scale == pytest.approx(weight.mass / MASS)
     assert np.mean(np.abs(off) < 1.96) >= 0.85  # 30 draws of 95 % fall below 25 once in thousands
     assert np.std(off) > 0.4  # nor are intervals so wide that nothing could miss them
+
+
+@pytest.mark.slow
+def test_an_interval_holds_a_mass_whose_noise_is_slower_than_a_part_of_the_path():
+    off = []
+    for seed in range(30):
+        logs = [
+            log("fitted", "identification", 100 + seed, drift=0.2),
+            log("other", "validation", 200 + seed, path=0.8, drift=0.2),
+            log("empty", "validation", 300 + seed, drift=0.2),
+            log("heavy", "weight", 300 + seed, HUNG.position, drift=0.2),
+        ]
+        weight, _, _ = analysed(logs, Weighing("heavy", HUNG, "empty"))
+        off.append((weight.mass - MASS) / weight.mass_std)
+    assert np.mean(np.abs(off) < 1.96) >= 0.85
+    assert 0.4 < np.std(off) < 1.4
 
 
 def test_friction_at_standstill_is_not_weighed():

@@ -17,6 +17,8 @@ class Load(LogJointRecord):
     rate: float
     period: float
     is_current: int
+    periods: int  # that are almost whole
+    period_spread: float  # 0 with one period or none
     t: Column
     q: Column
     load: Column

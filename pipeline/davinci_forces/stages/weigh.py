@@ -14,6 +14,7 @@ from davinci_forces.maths.contact.weighing import (
     Rows,
     agreement,
     better,
+    error_between,
     fit_mass,
     mirror_position,
     model_errors,
@@ -24,6 +25,7 @@ from davinci_forces.maths.contact.weighing import (
     residual,
     scaled_constant,
     shares,
+    spread_between,
     tip_position,
     unit_load,
     widening_factor,
@@ -46,6 +48,7 @@ FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing 
 ROWS_PER_CUTOFF_PERIOD = 6.0  # rows of a Load per period of the low-pass's cutoff frequency
 MIN_LOAD = 1e-6  # [effort/kg]; a joint with less does not carry the mass
 MIN_ROWS = 2 * PARTS  # rows of a path in each joint
+MIN_WHOLE = 0.9  # share of a path that a period covers, from which it counts
 MAX_TARE_DISTANCE = 0.1  # between the paths of a log and its tare, over the standard deviation of the position
 PHASES = 1000  # phases of a period at which two paths are compared
 MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, relative to the period
@@ -108,9 +111,11 @@ def run(
                 "tau_ext_unseen": path_means(*unseen[model.joint], first, length, count),
             }
             reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
+            each = periods_of((model.t, loads[0]), efforts[model.joint], first, length, count)
             yield Load(
                 log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
                 period=period, is_current=int(bool(joint.effort) or joint.name in measured),
+                periods=len(each), period_spread=spread_between(each) if np.abs(loads[0]).max() > MIN_LOAD else 0.0,
                 t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
@@ -164,6 +169,24 @@ def loads_per_kilogram(
     return stated, opposite
 
 
+def periods_of(
+    load: tuple[Array, Array], tau_ext: tuple[Array, Array], first: float, length: float, count: int
+) -> list[Rows]:
+    """The rows of each almost whole period of a path, in `count` parts, of a load and an effort with their times."""
+    rows = []
+    for period in range(int((load[0][-1] - first) // length) + 1):
+        start = first + period * length
+        inside = [(t >= start) & (t < start + length) for t, _ in (load, tau_ext)]
+        x, y = (
+            path_means(t[part], values[part], first, length, count)
+            for part, (t, values) in zip(inside, (load, tau_ext), strict=True)
+        )
+        both = np.isfinite(x) & np.isfinite(y)
+        if both.sum() > MIN_WHOLE * count:
+            rows.append(Rows(x[both], y[both], np.zeros(int(both.sum()), np.int64)))
+    return rows
+
+
 def path_means(t: Array, x: Array, first: float, length: float, count: int) -> Array:
     """Mean of a signal (N,) in each of `count` parts of the path; NaN in parts without samples."""
     part = ((t - first) / length % 1.0 * count).astype(np.int64) % count
@@ -185,8 +208,9 @@ def gather(
         carrying = [load for load in usable if load.weight == weighing.log == load.log]
         others = [load for load in usable if load.weight == weighing.log != load.log]
         of_tare = [load for load in others if load.log == weighing.tare]
+        spread = errors_between(carrying, of_tare if weighing.tare else [], others)
         tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
-        constants = [*torque_constants(weighing, carrying, tare, others, robot)]
+        constants = [*torque_constants(weighing, carrying, tare, others, robot, spread)]
         yield from constants
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
@@ -206,11 +230,29 @@ def gather(
         if fault:
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
-        yield from estimate_mass(weighing, weight_loads, tare, others, robot)
+        yield from estimate_mass(weighing, weight_loads, tare, others, robot, spread)
+
+
+def errors_between(carrying: Sequence[Load], tare: Sequence[Load], others: Sequence[Load]) -> dict[str, float]:
+    """Standard error of the mass that each joint alone tells, by its spread between periods, with that of the tare."""
+    spreads = {
+        joint: [(load.periods, load.period_spread) for load in loads]
+        for joint, loads in by_name([*carrying, *others], "joint").items()
+    }
+    errors = {load.joint: error_between(spreads[load.joint], load.periods) for load in carrying}
+    for load in tare:
+        if load.joint in errors:
+            errors[load.joint] = float(np.hypot(errors[load.joint], error_between(spreads[load.joint], load.periods)))
+    return errors
 
 
 def torque_constants(
-    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot
+    weighing: Weighing,
+    loads: Sequence[Load],
+    tare: Sequence[Load],
+    others: Sequence[Load],
+    robot: Robot,
+    spread: dict[str, float],
 ) -> Iterator[TorqueConstant | Diagnostic]:
     """Propose the torque constant of each joint whose current was measured, so that it carries the known mass.
 
@@ -222,6 +264,7 @@ def torque_constants(
         same = [other for other in others if other.joint == load.joint and not tare]
         parts = [tare[i] if tare else load, *filter(None, map(unseen_part, same))]
         run, *free = (fit_mass(rows_of([part], {}, "load")) for part in parts)
+        run = run._replace(std=max(run.std, spread[load.joint]))
         apparent = MassEstimate(run.mass, pooled_std(run, free))
         if not load.is_current:
             continue
@@ -270,7 +313,12 @@ class FreeMotionErrors(NamedTuple):
 
 
 def estimate_mass(
-    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot
+    weighing: Weighing,
+    loads: Sequence[Load],
+    tare: Sequence[Load],
+    others: Sequence[Load],
+    robot: Robot,
+    spread: dict[str, float],
 ) -> Iterator[Weight | FreeWeight | Diagnostic]:
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
     free = free_motion_errors(loads, others)
@@ -280,11 +328,16 @@ def estimate_mass(
     false = np.zeros(len(loads)) if tare else np.array([free.false_mass.get(joint, 0.0) for joint in joints])
     fit_std = 0.0 if tare else free.fit_std
     alone = [
-        [MassEstimate(mass, float(np.hypot(std, error))) for (mass, std), error in zip(masses, false, strict=True)]
+        [
+            MassEstimate(mass, float(np.hypot(max(std, spread[load.joint]), error)))
+            for (mass, std), load, error in zip(masses, loads, false, strict=True)
+        ]
         for masses in ([fit_mass([row]) for row in side] for side in sides)
     ]
     test, mirrored_test = (agreement(masses) for masses in alone)
+    between = float(np.linalg.norm(shares(sides[0]) * [spread[joint] for joint in joints]))
     (mass, run_std), (mass_mirrored, mirrored_run_std) = (fit_mass(rows) for rows in sides)
+    run_std, mirrored_run_std = max(run_std, between), max(mirrored_run_std, between)
     std = widen(free.widening * float(np.hypot(run_std, fit_std)), mass, alone[0], test)
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass

@@ -28,6 +28,7 @@ from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, of_
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
+MIN_DEGREES = 3  # of freedom, with which the spread between periods is known
 # If a smaller share of a column's power is variance, an offset more than doubles the standard error.
 MIN_VARIANCE_SHARE = 0.25
 MIN_AGREEMENT = 0.01  # probability of the joints' chi-square, below which they contradict each other
@@ -84,6 +85,24 @@ def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
         numerator += float(x @ y) / row.sigma**2
         denominator += float(x @ x) / row.sigma**2
     return numerator / denominator if denominator > 0 else float("nan")
+
+
+def spread_between(periods: Sequence[Rows]) -> float:
+    """Standard deviation of the mass that one joint tells in a period, between periods; 0 with fewer than two."""
+    return float(np.std([_mass([period]) for period in periods], ddof=1)) if len(periods) > 1 else 0.0
+
+
+def error_between(spreads: Sequence[tuple[int, float]], count: int) -> float:
+    """Standard error of the mean mass of `count` periods, of which 1.96 make a 95 % interval; 0 if periods are too few.
+
+    Noise that is slower than a sixth of the path shows between periods, and not in the jackknife.  `spreads` has, of
+    each log of the joint, the number of periods and their standard deviation.
+    """
+    degrees = sum(max(n - 1, 0) for n, _ in spreads)
+    if degrees < MIN_DEGREES or not count:
+        return 0.0
+    variance = sum((n - 1) * std**2 for n, std in spreads if n > 1) / degrees
+    return float(np.sqrt(variance / count)) * students_95(degrees) / NORMAL_95
 
 
 def pooled_std(run: MassEstimate, free: Sequence[MassEstimate]) -> float:
