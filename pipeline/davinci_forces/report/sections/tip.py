@@ -18,7 +18,7 @@ from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 F = ("f_x", "f_y", "f_z")
 PATH_POINTS = 600  # points drawn of the path in space
 CONVERGENCE = 1.0  # [s] time in which the filter converges; the axis of the force does not show its wide band
-SPACING = 0.2  # [s] between the vectors that are drawn in a contact
+MAX_FORCES = 5  # drawn of a contact beside the largest
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
 
@@ -173,10 +173,11 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     at, f = contact_samples(force, contact)
     here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
     weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
-    ends, (x, y, z) = here + per_newton * largest, here.T
+    ends = here + per_newton * largest
+    x, y, z = ends.T  # where numbers of contacts at one place are apart
     marks = (
         line(path[few], "path of the tip", "grey"),
-        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky", arrow=True),
+        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky"),
         line(strokes(here, ends), "where it is largest", "vermillion", arrow=True),
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
@@ -193,9 +194,9 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
 
 
 def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Column]:
-    """Samples within contacts, a fifth of a second apart, and the forces there."""
+    """A few samples within each contact, and the forces there."""
     f = np.column_stack([getattr(force, name) for name in F])
-    times = [np.arange(start, end, SPACING) for start, end in windows(contact)]
+    times = [np.linspace(start, end, MAX_FORCES + 2)[1:-1] for start, end in windows(contact)]
     at = np.unique(np.clip(np.searchsorted(force.t, np.concatenate(times)), 0, len(f) - 1))
     at = at[np.isfinite(f[at, 0])]
     return at, f[at]

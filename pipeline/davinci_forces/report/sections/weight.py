@@ -27,9 +27,10 @@ def section(context: Context) -> Iterator[Block]:
         "to the robot's chain. The external effort is measured minus modelled effort, low-passed without delay. Each "
         "joint is weighted by the inverse of its model's squared error in free motion. A constant offset of the "
         "effort, which differs from day to day (offset of the day), is estimated, too, if the data can separate it "
-        "from the load. The standard error combines the error of the fit with a jackknife over six parts of the path. "
-        "It is increased if logs without a mass give a mass that its standard error does not explain, or if the masses "
-        "that the joints give contradict each other: by chance in less than one of a hundred cases."
+        "from the load. The standard error combines the error of the fit with that of the run: by a jackknife over six "
+        "parts of the path, or by the spread between periods if that is larger. It is increased if logs without a mass "
+        "give a mass that its standard error does not explain, or if the masses that the joints give contradict each "
+        "other: by chance in less than one of a hundred cases."
     )
     if weights:
         yield summary(context, weights)
