@@ -20,10 +20,10 @@ def run(
     show: Annotated[bool, Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml, and print what to check; an existing file is never overwritten."""
-    from davinci_forces.study import template
+    from davinci_forces.study.draft import describe, is_folder, logs_in
 
-    folder = study or (files[0] if template.is_folder(files[0]) else files[0].parent)
-    draft = template.describe(template.logs_in(files), folder, robot)
+    folder = study or (files[0] if is_folder(files[0]) else files[0].parent)
+    draft = describe(logs_in(files), folder, robot)
     if show:
         echo(draft.text)
         return
