@@ -17,7 +17,7 @@ from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import force_sensor, is_tissue, tissue_channels
 from davinci_forces.study.entries import is_inside
 from davinci_forces.study.guessing import guess
-from davinci_forces.study.log_table import DraftLog, LogTable, Row, paths_in, quoted
+from davinci_forces.study.log_table import DraftLog, LogTable, Row, as_string, paths_in
 from davinci_forces.study.names import is_time
 from davinci_forces.study.roles import Evidence, roles_of
 
@@ -161,8 +161,8 @@ def _named_as(robot: Robot, drawn: Sequence[DraftLog]) -> list[DraftLog]:
 def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     robot = arm.robot
     reason = f"; {arm.reason}" if arm.reason else ""
-    yield f"title = {quoted(folder.resolve().name)}"
-    yield f"robot = {quoted(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
+    yield f"title = {as_string(folder.resolve().name)}"
+    yield f"robot = {as_string(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
     yield "simulated = false"
     if robot.tool:
         yield f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"
