@@ -39,6 +39,8 @@ def written(*records: Record) -> Section | None:
 def test_contact_is_shaded_where_the_arm_presses():
     spans = [mark for mark in haptics.spans(run()) if isinstance(mark, VSpan)]
     assert [(span.start, span.end) for span in spans] == [(0.01, 3.15), (6.29, 9.43)]
+    [span] = haptics.spans(run(true_force=np.maximum(T - 5.0, 0.0)))  # to the last sample
+    assert (span.start, span.end) == (5.01, 9.99)
 
 
 def test_all_is_on_screen_only_and_says_that_it_is_simulated():
