@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import chdtri
 
+from davinci_forces.identification import loads
 from davinci_forces.maths.contact.weighing import (
     MIN_AGREEMENT,
     PARTS,
@@ -44,7 +45,7 @@ HUNG = AttachedMass("hand_pitch", (0.0, -0.1, 0.5), MASS)
 @pytest.fixture(scope="module", autouse=True)
 def _periods_found_once():
     """The period of each motion is searched once: studies of other seeds differ in their efforts alone."""
-    repetition, known = weigh.repetition, {}
+    repetition, known = loads.repetition, {}
 
     def remembered(positions):
         key = tuple(x.tobytes() for x in positions)
@@ -53,7 +54,7 @@ def _periods_found_once():
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(weigh, "repetition", remembered)
+        patch.setattr(loads, "repetition", remembered)
         yield
 
 
@@ -458,7 +459,7 @@ def test_joints_count_by_how_well_their_models_do_in_free_motion():
 
 
 def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
-    monkeypatch.setattr(weigh, "repetition", lambda signals: None)
+    monkeypatch.setattr(loads, "repetition", lambda signals: None)
     t = T[: len(T) - 300]
     logs = [
         log("fitted", "identification", 103),

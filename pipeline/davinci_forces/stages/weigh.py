@@ -1,24 +1,30 @@
 """Estimate the mass on the arm from the joint efforts of a weight log, and torque constants from a known mass."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.identification.loads import (
+    MIN_ROWS,
+    errors_between,
+    external_effort,
+    loads_per_kilogram,
+    path_means,
+    period_of,
+    periods_of,
+    rows_of,
+    subtract_tare,
+    unseen_part,
+    whole_motion,
+)
 from davinci_forces.maths.contact.weighing import (
-    PARTS,
     Agreement,
     MassEstimate,
-    Rows,
     agreement,
     better,
-    error_between,
     fit_mass,
-    mirror_position,
     model_errors,
-    moved_with,
     offset,
     offset_std,
     pooled_std,
@@ -26,15 +32,9 @@ from davinci_forces.maths.contact.weighing import (
     scaled_constant,
     shares,
     spread_between,
-    tip_position,
-    unit_load,
     widening_factor,
 )
-from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.periods.period import refine
-from davinci_forces.maths.periods.repetition import harmonics_of, repetition
-from davinci_forces.maths.periods.shift import circular, straight
-from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
+from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records.prediction import JointModel
@@ -42,16 +42,11 @@ from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_
 from davinci_forces.records.recordings import Motion
 from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.robots.robot import Robot
-from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
+from davinci_forces.study import LogEntry, Weighing, Weighings
 
 FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing touches the arm
 ROWS_PER_CUTOFF_PERIOD = 6.0  # rows of a Load per period of the low-pass's cutoff frequency
 MIN_LOAD = 1e-6  # [effort/kg]; a joint with less does not carry the mass
-MIN_ROWS = 2 * PARTS  # rows of a path in each joint
-MIN_WHOLE = 0.9  # share of a path that a period covers, from which it counts
-MAX_TARE_DISTANCE = 0.1  # between the paths of a log and its tare, over the standard deviation of the position
-PHASES = 1000  # phases of a period at which two paths are compared
-MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, relative to the period
 MAX_RELATIVE_ERROR = 1 / 3  # standard error over the mass, up to which a torque constant is proposed
 MIN_SIDE_DIFFERENCE = 2.0  # [standard errors] by which the better side of a link must explain the effort better
 
@@ -91,7 +86,7 @@ def run(
     if entry.role == "identification":
         unseen = {model.joint: external_effort(model, model.tau_hat_unseen, lowpass) for model in moving}
     for weighing in relevant:
-        sides = loads_per_kilogram(robot.chain, robot, weighing.weight, motion)
+        sides = loads_per_kilogram(robot.chain, robot, weighing.weight.moves_with, weighing.weight.position, motion)
         for model in moving:
             joint = robot.joint(model.joint)
             per_current = joint.gear_ratio if joint.effort else 1.0
@@ -119,80 +114,6 @@ def run(
                 t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
-
-
-def whole_motion(motions: Sequence[Motion], robot: Robot) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (N, n) of all joints; 0 for joints that the log does not hold."""
-    q, dq, ddq = np.zeros((3, len(motions[0]), len(robot.joints)))
-    names = [joint.name for joint in robot.joints]
-    for motion in motions:
-        if len(motion) == len(motions[0]):
-            column = names.index(motion.joint)
-            q[:, column], dq[:, column], ddq[:, column] = motion.q, motion.dq, motion.ddq
-    return q, dq, ddq
-
-
-def period_of(motions: Sequence[Motion], robot: Robot) -> float:
-    """Common period [s] of the joints; 0 if the motion does not repeat."""
-    part = max(segments(motions[0].segment), key=lambda part: part.stop - part.start)
-    positions = [motion.q_measured[part] for motion in motions]
-    match = repetition(positions)
-    if match is None:
-        return 0.0
-    orders = harmonics_of(positions, match, max(robot.joint(motion.joint).harmonics for motion in motions))
-    return refine(motions[0].t[part], positions, match.lag / motions[0].rate, orders)
-
-
-def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
-    """Times (K,) at which the effort is measured and predicted, and the low-passed difference (K,).
-
-    Standstill is left out, as friction can then take any value, and so are filled samples.
-    """
-    predicted = np.isfinite(tau_hat)
-    tau_ext = (model.tau - tau_hat)[predicted]
-    if predicted.any():
-        tau_ext = lowpass_segments(tau_ext, model.segment[predicted], model.rate, lowpass)
-    measured = model.unscored[predicted] == 0
-    return model.t[predicted][measured], tau_ext[measured]
-
-
-def loads_per_kilogram(
-    chain: Chain, robot: Robot, weight: AttachedMass, motion: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
-    """Joint effort of a kilogram (N, n) at the stated position, and at its mirror position on the link."""
-    names = [joint.name for joint in robot.joints]
-    position = tip_position(chain, len(names)) if weight.position is None else np.array(weight.position)
-    link = weight.moves_with or chain.links[int(chain.body[chain.names.index(chain.tip)]) - 1]
-    if link in names:  # a joint, with which a link moves
-        link = moved_with(chain, names.index(link))
-    stated, opposite = (unit_load(chain, link, at, *motion) for at in (position, mirror_position(position)))
-    return stated, opposite
-
-
-def periods_of(
-    load: tuple[Array, Array], tau_ext: tuple[Array, Array], first: float, length: float, count: int
-) -> list[Rows]:
-    """The rows of each almost whole period of a path, in `count` parts, of a load and an effort with their times."""
-    rows = []
-    for period in range(int((load[0][-1] - first) // length) + 1):
-        start = first + period * length
-        inside = [(t >= start) & (t < start + length) for t, _ in (load, tau_ext)]
-        x, y = (
-            path_means(t[part], values[part], first, length, count)
-            for part, (t, values) in zip(inside, (load, tau_ext), strict=True)
-        )
-        both = np.isfinite(x) & np.isfinite(y)
-        if both.sum() > MIN_WHOLE * count:
-            rows.append(Rows(x[both], y[both], np.zeros(int(both.sum()), np.int64)))
-    return rows
-
-
-def path_means(t: Array, x: Array, first: float, length: float, count: int) -> Array:
-    """Mean of a signal (N,) in each of `count` parts of the path; NaN in parts without samples."""
-    part = ((t - first) / length % 1.0 * count).astype(np.int64) % count
-    samples = np.bincount(part, minlength=count)
-    sums = np.bincount(part, x, count)
-    return np.where(samples > 0, sums / np.maximum(samples, 1), np.nan)
 
 
 def gather(
@@ -231,19 +152,6 @@ def gather(
             message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
             yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
         yield from estimate_mass(weighing, weight_loads, tare, others, robot, spread)
-
-
-def errors_between(carrying: Sequence[Load], tare: Sequence[Load], others: Sequence[Load]) -> dict[str, float]:
-    """Standard error of the mass that each joint alone tells, by its spread between periods, with that of the tare."""
-    spreads = {
-        joint: [(load.periods, load.period_spread) for load in loads]
-        for joint, loads in by_name([*carrying, *others], "joint").items()
-    }
-    errors = {load.joint: error_between(spreads[load.joint], load.periods) for load in carrying}
-    for load in tare:
-        if load.joint in errors:
-            errors[load.joint] = float(np.hypot(errors[load.joint], error_between(spreads[load.joint], load.periods)))
-    return errors
 
 
 def torque_constants(
@@ -439,60 +347,3 @@ def free_motion_errors(weight_loads: Sequence[Load], others: Sequence[Load]) -> 
     fit_std = max(abs(of_fitted.mass), of_fitted.std, float(by_shares))
     validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
     return FreeMotionErrors(sigma, sigma_std, fit_std, false_mass, widening_factor(validation, fit_std), masses, roles)
-
-
-def unseen_part(load: Load) -> Load | None:
-    """Rows of a load with effort residuals from refits without those rows; None if the rows are too few."""
-    unseen = np.isfinite(load.tau_ext_unseen)
-    if unseen.sum() < MIN_ROWS:
-        return None
-    columns = {name: getattr(load, name)[unseen] for name in load.columns()}
-    return replace(load, **{**columns, "tau_ext": columns["tau_ext_unseen"]})
-
-
-def rows_of(loads: Sequence[Load], sigma: dict[str, float], column: str) -> list[Rows]:
-    """Rows of the regression for the mass, one entry per joint of a log, weighted by the error of its model."""
-    return [
-        Rows(getattr(load, column), load.tau_ext, np.arange(len(load)) * PARTS // len(load), sigma.get(load.joint, 1.0))
-        for load in loads
-    ]
-
-
-def subtract_tare(loads: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Load], str]:
-    """Subtract the effort of the tare at the same positions of the path; if that is not possible, return the reason."""
-    by_joint = {load.joint: load for load in tare}
-    missing = [load.joint for load in loads if load.joint not in by_joint]
-    if missing:
-        return [], f"does not move {' and '.join(missing)}"
-    pairs = [(load, by_joint[load.joint]) for load in loads]
-    period, tare_period = pairs[0][0].period, pairs[0][1].period
-    if abs(period - tare_period) > MAX_PERIOD_DIFFERENCE * period:
-        return [], f"repeats every {tare_period:.4g} s and not every {period:.4g} s (0: not at all)"
-    q, q_tare = (np.stack([even_positions(load) for load in column], axis=1) for column in zip(*pairs, strict=True))
-    shift = circular(q, q_tare) if period else straight(q, q_tare)
-    if shift.apart.max() > MAX_TARE_DISTANCE:
-        worst = loads[int(shift.apart.argmax())].joint
-        distance = f"{shift.apart.max():.2g} of the standard deviation of {worst}"
-        return [], f"is not on the same path: at best it is off by {distance}, above {MAX_TARE_DISTANCE:g}"
-    return [subtract_joint_tare(*pair, shift.samples) for pair in pairs], ""
-
-
-def even_positions(load: Load) -> Array:
-    """Position of a joint at `PHASES` phases of a period, or at the load's rate if the motion does not repeat."""
-    if load.period:
-        phase = (np.arange(PHASES) + 0.5) / PHASES
-        return np.asarray(np.interp(phase, load.t / load.period, load.q, period=1.0))
-    return np.asarray(np.interp(np.arange(load.t[0], load.t[-1], 1.0 / load.rate), load.t, load.q))
-
-
-def subtract_joint_tare(load: Load, tare: Load, samples: float) -> Load:
-    """Subtract the effort of a joint's tare, which lags by `samples`, on the part of the path that both logs cover."""
-    if load.period:
-        phase = load.t / load.period + samples / PHASES
-        tare_effort = np.interp(phase, tare.t / tare.period, tare.tau_ext, period=1.0)
-        return replace(load, tau_ext=load.tau_ext - tare_effort)
-    t = load.t - load.t[0] + tare.t[0] + samples / load.rate
-    shared = (t >= tare.t[0]) & (t <= tare.t[-1])
-    columns = {name: getattr(load, name)[shared] for name in load.columns()}
-    columns["tau_ext"] = columns["tau_ext"] - np.interp(t[shared], tare.t, tare.tau_ext)
-    return replace(load, **columns)
