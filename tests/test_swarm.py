@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.estimators import lse, pso
 from davinci_forces.estimators.problem import Prior, Regression
-from davinci_forces.estimators.pso import CONSTRICTED, THESIS, search
+from davinci_forces.estimators.pso import CONSTRICTED, THESIS, SwarmOptimum, search
 from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation import kernels
 from davinci_forces.maths.estimation.least_squares import solve_bounded, triangle
@@ -198,3 +198,12 @@ def test_the_inertia_of_particles_falls_in_a_straight_line_and_then_stays(monkey
     assert_allclose(w[[0, 10, 20, 40]], [first, 0.75 * first + 0.25 * last, (first + last) / 2.0, last])
     starts = np.flatnonzero(np.diff(w) > 0) + 1  # of each further swarm
     assert_allclose(w[40 : starts[0] if len(starts) else None], last)
+
+
+@pytest.mark.parametrize(("next_squares", "swarms"), [((1.0 + 1e-8,), 2), ((1.0 + 1e-5, 1.0), 3), ((0.5, 2.0, 3.0), 4)])
+def test_swarms_run_until_the_squares_of_two_agree(monkeypatch, next_squares, swarms):
+    results = iter((1.0, *next_squares))
+    monkeypatch.setattr(pso, "swarm", lambda *_: SwarmOptimum(np.zeros(1), np.zeros(1), next(results), np.zeros(1), 1))
+    found = search(None, None, 0)
+    assert found.swarms == swarms
+    assert found.squares == min(1.0, *next_squares)

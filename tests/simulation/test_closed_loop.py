@@ -12,7 +12,7 @@ from davinci_forces.maths.mechanics.rigid_body import gravity
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
-from davinci_forces.maths.simulation.surroundings import UP, Path, Surroundings
+from davinci_forces.maths.simulation.surroundings import UP, Path, Surroundings, pulse, triangle
 from davinci_forces.simulation.motion import SimulatedRun, simulate_log, theta
 from davinci_forces.simulation.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.scenario.reading import load
@@ -182,3 +182,9 @@ def test_pd_with_gravity_compensation_at_a_controllers_rate_comes_to_rest_at_its
     assert found.tau[-1] == pytest.approx(
         gravity(scenario().robot.chain, scenario().robot.bodies, found.q[-1]), abs=1e-2
     )
+
+
+def test_a_triangle_rises_to_its_peak_midway_and_a_pulse_is_constant_from_its_start_to_before_its_end():
+    t = np.array([0.9, 1.0, 1.5, 2.0, 2.5, 3.0, 3.1])
+    np.testing.assert_allclose(triangle(t, 1.0, 3.0, -4.0), [0, 0, -2, -4, -2, 0, 0], atol=1e-15)
+    np.testing.assert_array_equal(pulse(t, 1.0, 3.0, -4.0), [0, -4, -4, -4, -4, 0, 0])
