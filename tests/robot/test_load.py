@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from davinci_forces.identification.loads import loads_per_kilogram
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.contact.weighing import mirror_position, moved_with, unit_load
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, tip
 from davinci_forces.robots import davinci, dvrk_psm
-from davinci_forces.stages.weigh import loads_per_kilogram
-from davinci_forces.study import AttachedMass
 
 CHAINS = {"davinci": davinci.ROBOT.chain, "dvrk_psm": dvrk_psm.ROBOT.chain}
 LINKS = [(name, link) for name, chain in CHAINS.items() for link in chain.links[:9]]
@@ -95,6 +94,6 @@ def test_a_mass_without_a_place_hangs_at_the_tip(name):
     robot, still = {"davinci": davinci.ROBOT, "dvrk_psm": dvrk_psm.ROBOT}[name], np.zeros((20, 3))
     robot = replace(robot, joints=robot.joints[:3])
     q = np.random.default_rng(2).uniform(-0.5, 0.5, (20, 3))
-    stated, _ = loads_per_kilogram(robot.chain, robot, AttachedMass("", None), (q, still, still))
+    stated, _ = loads_per_kilogram(robot.chain, robot, "", None, (q, still, still))
     slope = GRAVITY * slopes(lambda x: tip(robot.chain, x)[..., 2], q)
     assert_allclose(stated, slope, atol=1e-8)
