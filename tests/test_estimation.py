@@ -366,3 +366,16 @@ def test_residuals_are_what_the_fit_leaves():
     lse = next(r for r in made if isinstance(r, Fit))
     residual = next(r for r in made if isinstance(r, Residual))
     assert np.mean((residual.tau - residual.tau_hat) ** 2) == pytest.approx(lse.mse)
+
+
+def test_where_least_squares_are_not_possible_no_error_is_due_to_the_model(monkeypatch):
+    def impossible(*_):
+        raise np.linalg.LinAlgError
+
+    seen, stds = [trajectory(arm.signal())], []
+    for errors in (lambda *_: 0.0, impossible):
+        monkeypatch.setattr(fit, "model_std", errors)
+        stds.append({r.estimator: r.theta_std for r in fitted_to(seen) if isinstance(r, Fit)})
+    assert stds[0].keys() == stds[1].keys() > {"lse", "wlse"}
+    for name, std in stds[0].items():
+        np.testing.assert_array_equal(std, stds[1][name], err_msg=name)

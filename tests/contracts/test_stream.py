@@ -109,6 +109,26 @@ def test_samples_one_by_one_give_what_the_study_measures_of_a_stream(lab, catalo
     assert streamed.stream_loss < 2.0
 
 
+def test_the_ratio_of_peaks_is_the_median_of_long_contacts_with_its_standard_error(lab, catalogue):
+    contact = next(c for c in catalogue.records(Contact) if c.joint == "hand_roll")
+    [track] = catalogue.select(Track, log=contact.log, joint="hand_roll")
+    onset, peaks = track.t[0] + np.array([1.0, 3.5, 6.0, 8.5]), (2.0, 2.2, 1.6, 9.0)
+    last = np.array([2.0, 2.0, 2.0, 0.1])  # the last contact is too short to count
+    columns = dict.fromkeys(Contact.columns(), np.ones(4))
+    found = replace(
+        contact, **columns | {"onset": onset, "release": onset + last, "duration": last, "peak": columns["peak"] * 2}
+    )
+    tau_ext = np.zeros(len(track))
+    for start, duration, peak in zip(onset, last, peaks, strict=True):
+        tau_ext[(track.t >= start) & (track.t <= start + duration)] = peak
+    about = next(e for e in lab.study.logs if e.name == contact.log)
+    [streamed] = stage.compare(track, tau_ext, found, about, 0.1, 0.1)
+    ratios = np.array(peaks[:3]) / 2.0
+    assert streamed.peak_ratio == pytest.approx(1.0)
+    assert streamed.peak_ratio_std == pytest.approx(np.sqrt(np.pi / 2.0) * ratios.std(ddof=1) / np.sqrt(3.0), rel=1e-4)
+    assert_allclose(streamed.peak, peaks)
+
+
 def test_bad_samples_leave_everything_as_it_was(small):
     stream, other = Stream(small.document()), Stream(small.document())
     n = len(stream.coordinates)

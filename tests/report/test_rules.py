@@ -21,7 +21,7 @@ from davinci_forces.report.sections.innovations import over_time
 from davinci_forces.report.sections.joints.friction import curves
 from davinci_forces.report.sections.joints.friction import in_words as friction_in_words
 from davinci_forces.report.sections.joints.residuals import in_words, motion_panel
-from davinci_forces.report.sections.noise import histogram, outliers
+from davinci_forces.report.sections.noise import by_period, histogram, outliers
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot
 from davinci_forces.report.sections.robot import links_in_space
 from davinci_forces.report.sections.tissue import spread, spread_panel, surface_map
@@ -128,6 +128,16 @@ def test_a_period_is_not_blamed_for_a_derived_velocity_which_errs_at_the_end_of_
     verdicts = list(outliers(context, record(Average, 100, period=1.0, periods=5)))
     assert bool(verdicts) == remarked
     assert not remarked or "velocity noise of period 5 of 5" in verdicts[0].text
+
+
+def test_the_noise_of_each_period_is_of_its_own_samples():
+    t = 2.0 + np.arange(450) / 100.0
+    residual = record(PeriodResidual, 450, t=t)
+    average = record(Average, 100, t_start=2.0, period=1.0, periods=4)
+    noise = np.minimum((t - 2.0 + 1e-9).astype(int) + 1.0, 4.0)  # what is left after the last period belongs to it
+    assert_allclose(by_period(residual, average, noise), [1, 2, 3, 4])
+    few = record(PeriodResidual, 3, t=np.array([2.1, 2.2, 3.5]))  # no sample in two periods, and one in another
+    assert_allclose(by_period(few, average, np.full(3, 5.0)), [5, 5, 0, 0])
 
 
 def test_a_normal_sample_lies_on_the_line_of_its_plot_whose_slope_is_the_standard_deviation():
