@@ -1,8 +1,9 @@
 """Change the code in one place at a time, and see whether a test fails: `make mutants` (SEED=n, COUNT=n).
 
 A mutant is one operator, comparison or number of a module that is changed to another.  Up to `MAX_FILES` test files
-run, until a test fails: those that import the module, the small studies, then those that import what imports it.  A
-mutant that no test notices survives: either a test is missing, or the change is of no consequence.
+run, until a test fails: those that import the module, the small studies, then those that import what imports it.  If
+none does, the slow tests of these files run, too.  A mutant that no test notices survives: either a test is missing, or
+the change is of no consequence.
 """
 
 import argparse
@@ -180,7 +181,8 @@ class Tree:
             replace_source(file, whole[: mutant.start] + mutant.after.encode() + whole[mutant.end :])
             if mutant.file.removeprefix(f"{PACKAGE}/") not in behind_compiled_code():
                 self.reuse_compiled_code()
-            return self.failing_test(tests_for(mutant))
+            files = tests_for(mutant)
+            return self.failing_test(files) or self.failing_test([*files, "--slow"])
         finally:
             replace_source(file, whole)
 

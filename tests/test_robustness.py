@@ -586,7 +586,10 @@ def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond
     assert at(1.0) == ""
     assert at(1.1) != at(1.9)
     for times in (1.1, 1.9):
-        assert "rad where the robot states -0.6 to 0.6; correct its limits for `excite`, or the units" in at(times)
+        assert (
+            "rad where the robot states -0.6 to 0.6; correct its limits, by which `excite` designs, or the units"
+            in at(times)
+        )
     for times in (2.1, 19.0):
         assert "times the limit of 0.6 rad" in at(times)
         assert "positions from" not in at(times)

@@ -23,6 +23,7 @@ from davinci_forces.records import (
     Prediction,
     Spectrum,
     Stiffness,
+    TipContact,
     Track,
     Weight,
 )
@@ -46,7 +47,7 @@ from davinci_forces.report.content import (
     walk,
 )
 from davinci_forces.report.content.layout import number_blocks
-from davinci_forces.report.content.marks import Points
+from davinci_forces.report.content.marks import Points, VSpan
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (
@@ -69,8 +70,10 @@ from davinci_forces.report.sections import (
 from davinci_forces.report.sections import (
     contacts as contacts_section,
 )
+from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
+from davinci_forces.study import Source
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
@@ -437,7 +440,8 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, found)
-    assert f"**{sum(map(len, found))} contacts found above the alarm level; the study states none. Largest: " in said
+    level = "above the alarm level, which free motion crosses at most once in ten minutes"
+    assert f"**{sum(map(len, found))} contacts found {level}; the study states none. Largest: " in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
     windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
@@ -565,8 +569,60 @@ def test_measurements_beyond_those_on_page_one_are_counted(full: Context):
     weights, many = full.catalogue.records(Weight), [measured] * 6
     catalogue = Catalogue(lambda kind: many if kind is Stiffness else full.catalogue.records(kind))
     *shown, last = opening.measurements(replace(full, catalogue=catalogue))
-    assert len(shown) == 3
-    assert last.startswith(f"{len(weights) + len(many) - 3} more logs")
+    assert len(shown) == opening.MAX_MEASURED
+    count = len(full.catalogue.records(TipContact)) + len(weights) + len(many)
+    assert last.startswith(f"{count - opening.MAX_MEASURED} more logs")
+
+
+def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(full: Context):
+    [contact] = full.catalogue.records(TipContact)
+    [line] = opening.forces_at_tip(full)
+    largest = full.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
+    assert line == f"**{contact.log}**: force at the tip up to {largest}, if nothing else was touched"
+    assert f"{contact.f_peak.max():.1f}" in line
+    [joint, *_] = full.study.robot.joints
+    drive = replace(joint, gear_ratio=200.0, torque_constant=0.0438)
+    robot = replace(full.study.robot, joints=(drive, *full.study.robot.joints[1:]))
+    channel = Source(f"{joint.name}.i", "current", "current")
+    logs = (replace(full.study.logs[0], channels=(channel,)),)
+    told = opening.currents_in_words(replace(full, study=replace(full.study, robot=robot, logs=logs)))
+    assert told == " Motor currents became efforts by gear ratio and torque constant: 8.76 N m/A on the hand roll."
+
+
+def test_where_nothing_is_to_be_looked_at_first_the_next_step_is_said(full: Context):
+    unknown = [log.name for log in full.study.logs if log.role == "contact" and not log.has_known_free_motion]
+    logs = tuple(replace(log, contact=(), free=()) if log.role == "contact" else log for log in full.study.logs)
+    told = summary.next_step(replace(full, study=replace(full.study, logs=logs)))
+    assert told.startswith(" Next: state when nothing touched the arm in ")
+    assert all(log.name in told for log in logs if log.role == "contact")
+    assert bool(summary.next_step(full)) == bool(unknown)
+
+
+def test_the_coverage_of_page_one_is_the_lowest_of_all_logs_that_were_not_fitted(full: Context):
+    [space, *_] = full.catalogue.select(FreeSpace, joint="hand_roll", filter="rts")
+    known = (("check", "validation", 0.3, 0.96), ("push", "contact", 0.2, 0.7), ("roll", "identification", 0.1, 0.5))
+    spaces = [
+        replace(space, log=log, role=role, detection_level=level, coverage=share) for log, role, level, share in known
+    ]
+    records = Catalogue(lambda kind: spaces if kind is FreeSpace else full.catalogue.records(kind))
+    about = replace(full, catalogue=records)
+    trusted = trust(about, "hand_roll")
+    assert (trusted.space.log, trusted.narrowest.log) == ("check", "push")
+    assert trusted.narrow
+    assert any("hand_roll" not in text and "push" in text for _, text in summary.looks_at_band(about, trusted))
+
+
+def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):
+    def still(track: Track) -> Track:
+        k = np.arange(len(track))
+        return replace(track, standing=((k < 50) | (k >= len(track) - 30)).astype(int))
+
+    tracks = [*map(still, full.catalogue.records(Track))]
+    about = replace(full, catalogue=Catalogue(lambda kind: tracks if kind is Track else full.catalogue.records(kind)))
+    [panel, *_] = [p for trusted in trusts(about, hand_roll=0.05) for p in summary.effort_panel(about, trusted)]
+    [track] = [t for t in tracks if panel.title == f"{title(t.joint)}, {t.log}"]
+    shaded = [(mark.start, mark.end) for mark in panel.marks if isinstance(mark, VSpan) and mark.colour == "grey"]
+    assert shaded == [(track.t[0], track.t[49]), (track.t[-30], track.t[-1])]
 
 
 def test_details_of_a_joint_are_those_of_least_squares_in_whichever_order_its_fits_are(full: Context):

@@ -17,7 +17,7 @@ from davinci_forces.runner.console import echo
 
 def run(
     study: Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
-    to: Annotated[str, Option("--to", metavar="FORMAT", help=f"Format: {', '.join(FORMATS)}.")],
+    to: Annotated[str, Option("--to", metavar="|".join(FORMATS), help=f"Format: {', '.join(FORMATS)}.")],
     out: Annotated[Path | None, Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
     joint: Annotated[
         list[str] | None, Option(help="Export this joint only; may be repeated. Default: all with a model.")

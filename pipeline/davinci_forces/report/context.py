@@ -111,9 +111,16 @@ class Context:
 
     def worst_space(self, joint: str) -> FreeSpace | None:
         """The smoother's free space of a joint with the highest detection level, if possible of a log not fitted."""
+        return max(self.spaces(joint), key=lambda space: space.detection_level, default=None)
+
+    def narrowest_space(self, joint: str) -> FreeSpace | None:
+        """The smoother's free space of a joint with the lowest coverage, if possible of a log not fitted."""
+        return min(self.spaces(joint), key=lambda space: space.coverage, default=None)
+
+    def spaces(self, joint: str) -> list[FreeSpace]:
+        """The smoother's free space of a joint in each log that was not fitted, else in each fitted one."""
         spaces = self.catalogue.select(FreeSpace, joint=joint, filter=SMOOTHER)
-        unseen = [space for space in spaces if space.role != "identification"]
-        return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
+        return [space for space in spaces if space.role != "identification"] or spaces
 
     def own_fits(self) -> list[Fit]:
         """The fits of each joint by itself."""

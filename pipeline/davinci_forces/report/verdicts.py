@@ -55,6 +55,7 @@ class Trust:
     space: FreeSpace | None
     sought: float | None  # the effort that the user wants to see
     about: PathShare | None = None  # of the predicted run
+    covered: FreeSpace | None = None  # the free space with the lowest coverage; `space` where it is None
 
     @property
     def share(self) -> float:
@@ -80,7 +81,8 @@ class Trust:
     @property
     def new_path(self) -> str:
         """The share of the run's path that no fit had, as it is printed; a dash where parts of a fitted log decide."""
-        return percent(self.about.path_new if self.about is not None and not self.of_parts else math.nan)
+        share = self.about.path_new if self.about is not None and not self.of_parts else math.nan
+        return f"{percent(share)}{', new' if share >= MIN_NEW_PATH else ''}"
 
     @property
     def at_rest(self) -> bool:
@@ -100,7 +102,12 @@ class Trust:
     @property
     def narrow(self) -> bool:
         """Whether the 95 % band covers too few samples of free space."""
-        return self.space is not None and band(self.space.coverage) == "bad"
+        return self.narrowest is not None and band(self.narrowest.coverage) == "bad"
+
+    @property
+    def narrowest(self) -> FreeSpace | None:
+        """The free space of which the 95 % band covers the smallest share of samples."""
+        return self.covered or self.space
 
     @property
     def words(self) -> str:
@@ -262,7 +269,8 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(GOOD)}, on a path of which more than {percent(MIN_NEW_PATH)} was not fitted",
          f"at most {percent(CAUTION)}, or tested only on the fitted path or mostly at rest", "beyond"),
         ("95 % band of the external effort", "coverage: share of free-space samples in the band",
-         f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
+         f"{percent(COVERED[0])} to {percent(COVERED[1])}",
+         f"above {percent(COVERED[1])} by more than its error: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
         ("Stiffness of tissue", "standard error over stiffness",
          f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",

@@ -165,7 +165,8 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield f"robot = {as_string(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
     yield "simulated = false"
     if robot.tool:
-        yield f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"
+        why = "of the tool's shaft: CHECK, forces at the tip depend on it"
+        yield f"# tool = {{ length = {robot.tool.length} }}  # [m] {why}"
     yield ""
     yield "[settings]  # every key has a default; the report lists the values used"
     yield "# harmonics = 0  # to keep in the position of a periodic motion; 0 keeps those that it has"
@@ -178,7 +179,7 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
         elif not joint.effort:
             yield from (
                 "",
-                f"# [robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive",
+                f"[robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive",
             )
             yield from (
                 f"# gear_ratio = {joint.gear_ratio!r}  # [{'rad/m' if joint.kind is Kind.PRISMATIC else 'rad/rad'}]",

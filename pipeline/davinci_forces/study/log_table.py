@@ -245,7 +245,8 @@ class LogTable:
             if self.robot.chain is None:
                 return f"# {line}  # the joint does not move"
             note = f"{note}; does not move, but a model of the whole arm needs it"
-        return f"{line}  # {meaning.reason}; {note}"
+        alias = f"{channel.alias}, " if "[" in channel.alias else ""
+        return f"{line}  # {alias}{meaning.reason}; {note}"
 
 
 def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:

@@ -81,7 +81,8 @@ def grade_of_mass(context: Context, weight: Weight) -> tuple[Level, str]:
 def trust(context: Context, joint: str) -> Trust:
     """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
     run, about = decisive(scored_predictions(context, joint), context.catalogue.select(PathShare, joint=joint))
-    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
+    worst, narrowest = context.worst_space(joint), context.narrowest_space(joint)
+    return Trust(joint, run, worst, context.study.settings.effort.get(joint), about, narrowest)
 
 
 def scored_predictions(context: Context, joint: str) -> list[Prediction]:

@@ -25,12 +25,14 @@ REACH = 0.5  # drawn length of the largest force over the extent of the path
 @section_of("Force at the tip", "tip", TipForce)
 def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The force at the tip of every log in which all joints that carry it move."""
+    tool = context.study.robot.tool
+    shaft = f" The shaft of the tool is taken to be {Number(tool.length, 'm')} long." if tool else ""
     yield Prose(
         "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
         "from the external efforts of the three joints, at times when all of them move. Two assumptions are "
-        "made: nothing but the tip is touched, and joints beyond these three stand at zero, as in a straight wrist. "
-        "The efforts are those of the smoother, which has no delay. Their covariance $C_tau$ contains the squares of "
-        "their standard deviations."
+        "made: nothing but the tip is touched, and joints beyond these three stand at zero, as in a straight wrist."
+        f"{shaft} The efforts are those of the smoother, which has no delay. Their covariance $C_tau$ contains the "
+        "squares of their standard deviations."
     )
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
@@ -119,7 +121,8 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
     name = literal(force.log)
     yield Figure(
         f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
-        f"{' Windows of contact are shaded.' if contact is not None else ''}",
+        f"{' Windows of contact are shaded.' if contact is not None else ''} Where a joint stands still, its friction "
+        "may take up any effort, so the band is wide.",
         f"Components of the force at the tip over time in {name}, and the condition number of its poses.",
         (*(component_panel(force, axis, contact) for axis in "xyz"), condition_panel(force)),
         f"tip-time-{force.log}",

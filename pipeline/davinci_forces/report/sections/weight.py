@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
@@ -66,15 +67,18 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
     for constant in constants:
         stated, used = Number(constant.stated_mass, "kg"), Number(constant.torque_constant_used, "N m/A")
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
-        rows.append((*run_cells(constant), str(stated), str(used), proposed))
+        away = abs(constant.torque_constant - constant.torque_constant_used) / constant.torque_constant_std
+        follows = "–" if math.isnan(away) else "keep" if away <= NORMAL_95 else "check"
+        rows.append((*run_cells(constant), str(stated), str(used), proposed, follows))
     caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
         'apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml; a line `effort = "A"` '
         "there is left out. They assume the stated mass, its position and the gear ratio. Joints whose current shows "
-        "the mass too imprecisely are left out."
+        "the mass too imprecisely are left out. Keep: the one in use lies in the 95 % interval; check: it does not, so "
+        "check mass, position, gear and motor."
     )
-    header = ("Log", "Joint", "Known mass", "Used", "Proposed")
-    return Table(caption, header, rows, "torque-constants", "llrrr")
+    header = ("Log", "Joint", "Known mass", "Used", "Proposed", "In use")
+    return Table(caption, header, rows, "torque-constants", "llrrrl")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
@@ -155,7 +159,8 @@ def by_joint(context: Context, weight: Weight) -> Table:
     caption = (
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at its position and "
         "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
-        f"standard error of the mass includes it.{together if len(rows) > 1 else ''} Also the offset of the day, and "
+        "standard error of the mass includes it, or is 0 where a tare is subtracted, as it cancels."
+        f"{together if len(rows) > 1 else ''} Also the offset of the day, and "
         "the root mean squares of the residual with the mass and of the model's error in free motion."
     )
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")

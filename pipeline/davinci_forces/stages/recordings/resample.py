@@ -191,7 +191,8 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
             spans = "{:.3g} to {:.3g} {{position}}{} where the robot states {:.3g} to {:.3g}"
             beyond.append(joint.unit(f"{what} from {spans.format(low, high, unit, *bounds)}"))
     if beyond:
-        text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; correct its limits for `excite`, or the units"
+        remedy = "correct its limits, by which `excite` designs, or the units"
+        text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"
         yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", "note", text)
 
 

@@ -69,10 +69,19 @@ def section(context: Context) -> Iterator[Block]:
         )
     yield trust_table(context, trusts)
     yield Prose(rule_in_words(trusts))
-    if looks := first_looks_in_order(context, trusts):
-        yield Prose("**Look at these first.**")
+    looks = first_looks_in_order(context, trusts)
+    yield Prose("**Look at these first.**" if looks else f"**Nothing has to be looked at first.**{next_step(context)}")
+    if looks:
         yield Bullets(looks)
     yield opening.sign_off(context)
+
+
+def next_step(context: Context) -> str:
+    """What would make contacts more certain, if anything is left to state."""
+    logs = [log for log in context.study.logs if log.role == "contact" and not log.has_known_free_motion]
+    names = as_list([literal(log.name) for log in logs])
+    state = f" Next: state when nothing touched the arm in {names} (`free`), if you know it; see [@contacts]."
+    return state if logs and context.catalogue.records(Contact) else ""
 
 
 def rule_in_words(trusts: list[Trust]) -> str:
@@ -92,7 +101,7 @@ def caption(contacts: list[Contact], panels: list[Panel]) -> str:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
     which *= len({contact.log for contact in contacts}) > 1
-    is_shaded = any(isinstance(mark, VSpan) for panel in panels for mark in panel.marks)
+    is_shaded = any(isinstance(mark, VSpan) and mark.colour == "sky" for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
     return f"External effort of each joint{shaded}. {which}{level}"
 
@@ -112,7 +121,7 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
         f"{count(len(context.study.logs), 'log')}. "
-        f"{opening.logs_in_words(context)}"
+        f"{opening.logs_in_words(context)}{opening.currents_in_words(context)}"
     )
     if not contacts:
         contact_logs = any(log.role == "contact" for log in context.study.logs)
@@ -123,7 +132,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
         small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
         doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
-        text = f"{text} **{unstated} found above the alarm level; the study states none.{peaks}**"
+        found = "found above the alarm level, which free motion crosses at most once in ten minutes"
+        text = f"{text} **{unstated} {found}; the study states none.{peaks}**"
         return f"{text}{doubt}" if small else text
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
@@ -173,10 +183,15 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
         converged = track.t - track.t[0] >= 1.0
         line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], track.standing > 0, [0]]))).reshape(-1, 2)
+        still = [
+            VSpan(float(track.t[start]), float(track.t[end - 1]), "" if i else "at rest: not judged", "grey")
+            for i, (start, end) in enumerate(edges)
+        ]
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
-        yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
+        yield Panel(heading, "time [s]", effort, (*spans, *still, *level, line, *peaks))
 
 
 def in_column(panels: list[Panel]) -> Iterator[Panel]:
@@ -213,12 +228,12 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     caption = (
-        "Trust in the estimates. Each row is of the joint's worst logs: New path to Ceiling of that with the "
-        "largest model error, Detection level and Coverage of that with the highest level. New path: share of the "
-        "run's motion that is unlike any fitted path. Model error: RMS of measured minus modelled effort, both "
-        "low-passed, without noise. Error/effort: model error over the RMS of the measured effort; $R^2$ includes "
-        "the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
-        "lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
+        "Trust in the estimates. Each row is of the joint's worst logs: New path to Ceiling of that with the largest "
+        "model error, Detection level of that with the highest level, Coverage of that with the lowest. New path: "
+        "share of the run's motion that is unlike any fitted path; above 10 %, it tests the model. Model error: RMS of "
+        "measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of the "
+        "measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
+        "free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
@@ -232,9 +247,8 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     ceiling, level = context.number(f"{scored}.r2_ceiling", 4, std=None), context.number(f"{free}.detection_level", 2)
     size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
     wanted = (size,) if with_sought else ()
-    covers = (
-        f"{percent(space.coverage)}, {band_in_words(space.coverage, space.coverage_std)}" if space is not None else "–"
-    )
+    band = trusted.narrowest
+    covers = f"{percent(band.coverage)}, {band_in_words(band.coverage, band.coverage_std)}" if band is not None else "–"
     return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
 
 
@@ -342,7 +356,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
-    if trusted.narrow:
+    if trusted.narrow and trusted.narrowest is not None:
+        space = trusted.narrowest
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
             covers += " More logs of free motion, at these speeds and on other days, calibrate it."

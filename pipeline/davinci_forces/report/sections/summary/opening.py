@@ -5,9 +5,9 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.records import Stiffness, Weight
+from davinci_forces.records import Stiffness, TipContact, Weight
 from davinci_forces.records.record import as_list
-from davinci_forces.report.content import Prose, Verdict, literal
+from davinci_forces.report.content import Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, percent, stiffness_level
@@ -21,7 +21,7 @@ USES = {  # what the logs of each role are for
     "friction": "to map friction",
     "tissue": "of pushes on tissue",
 }
-MAX_MEASURED = 3  # masses and stiffnesses on page one
+MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
 MIN_QUARTILES = 4  # pushes, below which quartiles are interpolated rather than observed
 MAX_NAMED = 3  # joints that a clause of the verdict names
 TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject"
@@ -70,10 +70,17 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
 
 
 def measurements(context: Context) -> tuple[str, ...]:
-    """The masses beside the stated ones and the stiffnesses with their quartiles, with verdicts, a line each."""
-    lines = [*masses(context), *stiffnesses(context)]
+    """The largest forces at the tip, the masses beside the stated ones, and the stiffnesses, a line each."""
+    lines = [*forces_at_tip(context), *masses(context), *stiffnesses(context)]
     more = [f"{count(len(lines) - MAX_MEASURED, 'more log')}: see the contents."] if lines[MAX_MEASURED:] else []
     return (*lines[:MAX_MEASURED], *more)
+
+
+def forces_at_tip(context: Context) -> Iterator[str]:
+    """The largest force at the tip in the contacts of each log, with its standard error."""
+    for contact in context.catalogue.records(TipContact):
+        largest = context.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
+        yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched"
 
 
 def masses(context: Context) -> Iterator[str]:
@@ -102,6 +109,18 @@ def logs_in_words(context: Context) -> str:
     roles = [log.role for log in context.study.logs]
     uses = [f"{roles.count(role)} {use}" for role, use in USES.items() if role in roles]
     return f"{'Simulated logs' if context.study.simulated else 'Logs'} of this study: {as_list(uses)}."
+
+
+def currents_in_words(context: Context) -> str:
+    """State by which constants motor currents became efforts; "" if none did."""
+    measured = {source.joint for log in context.study.logs for source in log.channels if source.symbol == "i"}
+    factors = [
+        f"{Number(joint.gear_ratio * joint.torque_constant, joint.unit('{effort}/A'), digits=3)} on "
+        f"{name_in_sentence(joint.name)}"
+        for joint in context.study.robot.joints
+        if joint.name in measured and not joint.effort
+    ]
+    return f" Motor currents became efforts by gear ratio and torque constant: {as_list(factors)}." if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
