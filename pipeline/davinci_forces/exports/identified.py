@@ -107,7 +107,10 @@ class Export:
 
     def remarks(self) -> list[str]:
         """Name springs that are negative beyond their error, and negative parameters that physics makes positive."""
-        advice = "in a simulation or a compensation it can drive the joint"
+        advice = (
+            "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have: "
+            "fit = 'independent.consistent' in [settings]"
+        )
         return [
             f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
             for fit, model in self.fits.values()

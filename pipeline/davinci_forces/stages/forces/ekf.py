@@ -27,14 +27,14 @@ def run(
     The effect of other joints and of the friction's memory enters by the measured motion.  (7.6)-(7.16)
     """
     if noise is not None:
-        yield from track_effort(model, noise_model(noise, joint, 1.0 / model.rate, q_tau), band, entry)
+        yield from track_effort(model, noise_model(noise, joint, 1.0 / model.rate, q_tau), band, entry, joint)
         return
     message = "no identification log gives the noise of the filter, so its external effort is not estimated"
     yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {message}")
 
 
 def track_effort(
-    model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry
+    model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry, joint: Joint
 ) -> Iterator[Track | Diagnostic]:
     """Estimate the external effort of one joint of a log, with its error."""
     parts, moving = filter_inputs(model), (model.unscored == 0) | bool(model.at_rest)
@@ -47,7 +47,7 @@ def track_effort(
         if not np.isfinite(estimate.tau_ext).all():
             return
     if offset.drifts:
-        yield drift_warning(model, offset)
+        yield drift_warning(model, offset, joint.unit("{effort}"))
     free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     numbers = numbers_of(estimate, offset, converged, free)
     blocks = gather_blocks(filter_blocks(DEFAULT, parts, noise)) if is_long else [(slice(0, len(model)), estimate)]
@@ -128,10 +128,11 @@ def divergence_warning(model: JointModel, nis: float) -> Diagnostic:
     return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)
 
 
-def drift_warning(model: JointModel, offset: DayOffset) -> Diagnostic:
+def drift_warning(model: JointModel, offset: DayOffset, unit: str) -> Diagnostic:
     """Warn of an offset that changes between the free windows."""
     message = (
-        f"{model.log}/{model.joint}: the offset drifts within the free windows by {offset.drift:.3g}, with a "
-        f"standard error of {offset.drift_std:.2g}; shorten the log, or state a free window nearer to the contact"
+        f"{model.log}/{model.joint}: the offset drifts within the free windows by {offset.drift:.3g} {unit}, with a "
+        f"standard error of {offset.drift_std:.2g} {unit}, so efforts between them are uncertain by as much; shorten "
+        "the log, or state a free window nearer to the contact"
     )
     return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)

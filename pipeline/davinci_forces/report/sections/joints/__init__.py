@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.estimators import title_of
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
-from davinci_forces.records.record import slug
+from davinci_forces.records.record import as_list, slug
 from davinci_forces.report.content import Block, Bullets, Cell, Equation, OnScreen, Prose, Section, Table, Verdict
 from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.number import Number
@@ -89,7 +89,7 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     added = [name for name in of_joint(used, joint).values() if name not in base]
     row = context.efforts_of(used).index(joint)
     added = [f"“{name}”" if "," in name else name for name in added]
-    changed = [f"it adds {' and '.join(', '.join(added).rsplit(', ', 1))}"] if added else []
+    changed = [f"it adds {as_list(added)}"] if added else []
     changed += ["it couples the joint to the others"] if any(map(is_of_link, used.phi)) else []
     if used.cutoff[row] != plain.cutoff[0]:
         changed.append(
