@@ -599,6 +599,13 @@ def test_what_is_three_times_above_the_level_of_the_rest_of_a_log_is_a_touch(mon
     assert ["at 20.00 s" in warning.text[0] for warning in warnings] == [True] * touches
 
 
+def test_an_effort_at_standstill_is_no_touch_however_small_efforts_are(monkeypatch):
+    monkeypatch.setattr(assess, "typical_alarm_level", lambda *given: 1e-4)
+    still = np.where(np.arange(len(T)) < 1000, 0.0, MOVING)
+    effort = np.where(np.arange(len(T)) == 500, 1.0, 2e-4)
+    assert not [*assess.touch_warning(track(effort, dq=still), np.ones(len(T), bool), arm.ARM)]
+
+
 @pytest.mark.parametrize(("samples", "levels"), [(99, 0), (100, 1)])
 def test_a_level_takes_a_hundred_samples_of_free_space(samples, levels):
     free = np.arange(len(T)) < samples

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -379,3 +380,16 @@ def test_where_least_squares_are_not_possible_no_error_is_due_to_the_model(monke
     assert stds[0].keys() == stds[1].keys() > {"lse", "wlse"}
     for name, std in stds[0].items():
         np.testing.assert_array_equal(std, stds[1][name], err_msg=name)
+
+
+def test_a_guess_states_its_error_with_its_standard_error():
+    rng = np.random.default_rng(4)
+    Phi, guess = rng.normal(size=(400, 2)), np.array([1.0, -2.0])
+    tau = Phi @ guess + rng.normal(size=400)
+    regression = SimpleNamespace(Phi=Phi, tau=tau, known=SimpleNamespace(guess=guess))
+    parameters = [SimpleNamespace(name=name, unit="N m") for name in "ab"]
+    [made] = fit.guesses(SimpleNamespace(group="roll", parameters=parameters), regression)
+    assert made.mse == pytest.approx(1.0, abs=0.2)
+    assert made.mse_std == pytest.approx(np.sqrt(2.0 / 400), rel=0.3)  # of squares of normal values
+    [none] = [*fit.guesses(None, SimpleNamespace(known=SimpleNamespace(guess=None)))] or [None]
+    assert none is None

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf, tracker
-from davinci_forces.filters.innovations import coloured
+from davinci_forces.filters.innovations import coloured, trials
 from davinci_forces.filters.innovations.innovations import correct_times, delays, innovations
 from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
 from davinci_forces.filters.innovations.trials import (
@@ -237,6 +237,17 @@ def test_fewer_samples_are_no_cause():
     assert passes.trial(()).lowest < 0.01 < passes.trial((REVERSALS,)).lowest
     assert not passes.fails_elsewhere((REVERSALS,))
     assert not any(REVERSALS in names for names in without(search(subject(run, far=some))))
+
+
+def test_as_many_other_times_are_tried_as_are_judged(monkeypatch):
+    run, offsets = measured(), []
+    some = np.arange(N) % 200 < 40
+    passes = Passes(subject(run, far=some))
+    monkeypatch.setattr(np, "roll", lambda x, by, roll=np.roll: offsets.append(by) or roll(x, by))
+    passes.fails_elsewhere((REVERSALS,))
+    each = offsets[::2]  # both samples and motion are moved
+    assert len(each) == len(set(each)) == trials.ELSEWHERE
+    assert each[0] == round(N * 0.6180339887498949)
 
 
 def test_a_run_that_fails_by_chance_has_no_cause():

@@ -310,6 +310,13 @@ def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(ful
     assert all(said in text for text in looks)
 
 
+def test_an_error_that_is_mostly_constant_is_named_with_what_is_left_without_it(full: Context):
+    p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.mean_error" in full.results)
+    p = replace(p, model_error=0.5, mean_error=0.4, mean_error_std=0.01, effort_rms=1.0)
+    [(_, text)] = summary.looks_at_model(full, Trust("hand_roll", p, None, None))
+    assert f"; {full.size(p, 'model_error', 0.3, 2)} without its constant part, " in text
+
+
 def test_an_error_of_twice_the_effort_suggests_a_wrong_sign(full: Context):
     p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.model_error" in full.results)
     for share, suggests in ((2.04, True), (1.5, False)):

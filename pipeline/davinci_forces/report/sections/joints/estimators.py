@@ -30,7 +30,7 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
         return
     plain = residuals["lse"]
     apart = {name: float(abs(r.tau_hat - plain.tau_hat).max()) for name, r in residuals.items()}
-    same = [name for name in MEANT_TO_DIFFER if name in apart and apart[name] < ALIKE * (plain.tau.std() or 1.0)]
+    same = [name for name in MEANT_TO_DIFFER if name in apart and apart[name] < ALIKE * plain.tau.std()]
     residuals = {name: r for name, r in residuals.items() if name not in same}
     others = {name: r for name, r in residuals.items() if name != "lse"}
     if not others:
