@@ -593,7 +593,7 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     channel = Source(f"{joint.name}.i", "current", "current")
     logs = (replace(full.study.logs[0], channels=(channel,)),)
     told = opening.currents_in_words(replace(full, study=replace(full.study, robot=robot, logs=logs)))
-    assert told == " Motor currents became efforts by gear ratio and torque constant: 8.76 N m/A on the hand roll."
+    assert told == " 1 A of a motor counts as 8.76 N m on the hand roll."
 
 
 def test_where_nothing_is_to_be_looked_at_first_the_next_step_is_said(full: Context):

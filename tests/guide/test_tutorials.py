@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -63,6 +64,9 @@ def follow(page: Path, folder: Path) -> None:
 def test_what_a_tutorial_says_is_what_a_reader_sees(page, tmp_path):
     LOGS[page](tmp_path)
     follow(PAGES[page], tmp_path)
+    for report in tmp_path.glob("reports/*/report.pdf") if shutil.which("pdftotext") else ():
+        first = subprocess.run(["pdftotext", "-l", "1", report, "-"], capture_output=True, text=True).stdout
+        assert "Reviewed by" in first, f"{report.parent.name}: the answer needs more than a page"
 
 
 def test_every_tutorial_has_logs_and_every_log_a_tutorial():

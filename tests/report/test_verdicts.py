@@ -124,7 +124,7 @@ def level_of(predictions, shares):
 def test_a_whole_log_left_out_decides_and_not_its_blocks_of_path():
     shares = [path_share("one"), path_share("two")]
     both = level_of([by_blocks("one"), by_blocks("two"), by_log("one", 0.15), by_log("two", 0.2)], shares)
-    assert (both.level, both.prediction.model_error, both.new_path) == ("warn", 0.2, "100 %, new")
+    assert (both.level, both.prediction.model_error, both.new_path) == ("warn", 0.2, "100 %")
     worse = level_of([by_blocks("one", 0.3), by_log("one", 0.05), by_log("two", 0.05)], shares)
     assert (worse.level, worse.prediction.model_error) == ("good", 0.05)
     alone = level_of([by_blocks()], shares[:1])

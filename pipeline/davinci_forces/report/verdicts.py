@@ -81,8 +81,7 @@ class Trust:
     @property
     def new_path(self) -> str:
         """The share of the run's path that no fit had, as it is printed; a dash where parts of a fitted log decide."""
-        share = self.about.path_new if self.about is not None and not self.of_parts else math.nan
-        return f"{percent(share)}{', new' if share >= MIN_NEW_PATH else ''}"
+        return percent(self.about.path_new if self.about is not None and not self.of_parts else math.nan)
 
     @property
     def at_rest(self) -> bool:

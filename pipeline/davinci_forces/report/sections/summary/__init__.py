@@ -35,7 +35,7 @@ FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds o
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 MAX_IN_COLUMN = 3  # panels below each other on page one
-ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 62.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
+ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
 @section_of("The answer", "summary")

@@ -100,7 +100,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
         quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
         why = "; a straight line explains at most 90 % of the force of the others" if log.pushes < len(log) else ""
-        used = f" ({log.pushes} pushes used, of {len(log)} with contact{why})"
+        used = f" ({log.pushes} of {count(len(log), 'push')}{why})"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
 
@@ -115,12 +115,12 @@ def currents_in_words(context: Context) -> str:
     """State by which constants motor currents became efforts; "" if none did."""
     measured = {source.joint for log in context.study.logs for source in log.channels if source.symbol == "i"}
     factors = [
-        f"{Number(joint.gear_ratio * joint.torque_constant, joint.unit('{effort}/A'), digits=3)} on "
+        f"{Number(joint.gear_ratio * joint.torque_constant, joint.unit('{effort}'), digits=3)} on "
         f"{name_in_sentence(joint.name)}"
         for joint in context.study.robot.joints
         if joint.name in measured and not joint.effort
     ]
-    return f" Motor currents became efforts by gear ratio and torque constant: {as_list(factors)}." if factors else ""
+    return f" 1 A of a motor counts as {as_list(factors)}." if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
