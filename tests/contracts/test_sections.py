@@ -628,7 +628,7 @@ def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):
     about = replace(full, catalogue=Catalogue(lambda kind: tracks if kind is Track else full.catalogue.records(kind)))
     [panel, *_] = [p for trusted in trusts(about, hand_roll=0.05) for p in summary.effort_panel(about, trusted)]
     [track] = [t for t in tracks if panel.title == f"{title(t.joint)}, {t.log}"]
-    shaded = [(mark.start, mark.end) for mark in panel.marks if isinstance(mark, VSpan) and mark.colour == "grey"]
+    shaded = [(mark.start, mark.end) for mark in panel.marks if isinstance(mark, VSpan) and mark.colour == "yellow"]
     assert shaded == [(track.t[0], track.t[49]), (track.t[-30], track.t[-1])]
 
 

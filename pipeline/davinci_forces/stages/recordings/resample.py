@@ -179,17 +179,14 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
 
 def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[Diagnostic]:
     """Note low-passed positions and velocities that exceed the joint's limits by less than a wrong unit would."""
-    beyond = []
-    for what, unit, x, bounds in zip(
-        ("positions", "velocities"), ("", "/s"), smooth, (joint.limits.q, joint.limits.dq), strict=False
-    ):
+    beyond, limits = [], (joint.limits.q, joint.limits.dq)
+    for what, unit, x, (least, most) in zip(("positions", "velocities"), ("", "/s"), smooth, limits, strict=False):
         low, high = np.percentile(x, (1.0, 99.0))
-        slack = OVER_LIMITS * (bounds[1] - bounds[0])
-        if (low < bounds[0] - slack or high > bounds[1] + slack) and max(-low, high) <= MAX_BEYOND_LIMITS * max(
-            map(abs, bounds)
-        ):
-            spans = "{:.3g} to {:.3g} {{position}}{} where the robot states {:.3g} to {:.3g}"
-            beyond.append(joint.unit(f"{what} from {spans.format(low, high, unit, *bounds)}"))
+        slack, largest = OVER_LIMITS * (most - least), max(-least, most)
+        exceeds = low < least - slack or high > most + slack
+        if exceeds and max(-low, high) <= MAX_BEYOND_LIMITS * largest:
+            reach = joint.unit(f"{what} from {low:.3g} to {high:.3g} {{position}}{unit}")
+            beyond.append(f"{reach} where the robot states {least:.3g} to {most:.3g}")
     if beyond:
         remedy = "correct its limits, by which `excite` designs, or the units"
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"

@@ -185,7 +185,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
         edges = np.flatnonzero(np.diff(np.concatenate([[0], track.standing > 0, [0]]))).reshape(-1, 2)
         still = [
-            VSpan(float(track.t[start]), float(track.t[end - 1]), "" if i else "at rest: not judged", "grey")
+            VSpan(float(track.t[start]), float(track.t[end - 1]), "" if i else "at rest: not judged", "yellow")
             for i, (start, end) in enumerate(edges)
         ]
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
@@ -316,18 +316,12 @@ def looks_at_speeds(context: Context, joints: list[str]) -> Iterator[tuple[float
     """Yield a caveat for the joint and log that are fastest, compared with fitted logs."""
     shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
     fastest = max(shares, key=lambda share: np.nan_to_num(share.speed_ratio), default=None)
-    if fastest is not None and fastest.speed_ratio > verdicts.MAX_SPEED_RATIO:
-        name, ratio = (
-            f"{title(fastest.joint)}, {literal(fastest.log)}",
-            context.number(f"path.{fastest.log}.{fastest.joint}.speed_ratio", 2),
-        )
-        text = (
-            f"it moves {ratio} times as fast as in any fitted log, so its model extrapolates, and errors may be larger."
-        )
-        yield (
-            fastest.speed_ratio / verdicts.MAX_SPEED_RATIO,
-            f"**{name}**: {text} Record an identification log as fast.",
-        )
+    if fastest is None or not fastest.speed_ratio > verdicts.MAX_SPEED_RATIO:
+        return
+    ratio = context.number(f"path.{fastest.log}.{fastest.joint}.speed_ratio", 2)
+    text = f"it moves {ratio} times as fast as in any fitted log, so its model extrapolates, and errors may be larger."
+    name = f"**{title(fastest.joint)}, {literal(fastest.log)}**"
+    yield fastest.speed_ratio / verdicts.MAX_SPEED_RATIO, f"{name}: {text} Record an identification log as fast."
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
