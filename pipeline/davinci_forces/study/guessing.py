@@ -118,7 +118,9 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     content = _by_content(log, [channel.name for channel in numbers if channel.name != log.time])
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
         return content
-    untold = not any(symbol_of(words_of(channel.name)) for channel in numbers)  # as of `Untitled 1`
+    untold = bool(content.meanings) and not any(
+        symbol_of(words_of(channel.name)) for channel in numbers
+    )  # as of `Untitled 1`
     if untold or any(robot.file and len(robot.joints) == content.joints for robot in robots):
         reasons = {name: f"CHECK: {m.reason.removeprefix('CHECK: ')}" for name, m in content.meanings.items()}
         return replace(content, meanings={n: replace(m, reason=reasons[n]) for n, m in content.meanings.items()})
