@@ -278,6 +278,14 @@ def test_where_each_file_has_one_joint_its_name_tells_which(tmp_path, files, joi
     assert "CHECK" not in said
 
 
+def test_pushes_that_names_tell_are_no_joint_whatever_their_values_say(tmp_path):
+    t, q, dq = motion(1)
+    new(table(tmp_path / "probe.csv", t, 0.01 * q, 0.01 * dq, effort(q, dq), header="time,indentation,v,load"))
+    [entry] = reading.read(tmp_path).logs
+    assert entry.role == "tissue"
+    assert {s.quantity: s.channel for s in entry.channels} == {"time": "time", "depth": "indentation", "force": "load"}
+
+
 def test_a_log_of_one_joint_that_nothing_tells_is_to_be_checked_beside_logs_of_more(tmp_path):
     t, q, dq = motion(2)
     names = [f"{quantity} {joint}" for quantity in ("q", "tau") for joint in (1, 2)]

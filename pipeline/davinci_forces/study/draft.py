@@ -16,7 +16,7 @@ from davinci_forces.study import belonging
 from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import force_sensor, is_tissue, tissue_channels
 from davinci_forces.study.entries import is_inside
-from davinci_forces.study.guessing import guess
+from davinci_forces.study.guessing import Holding, guess
 from davinci_forces.study.log_table import DraftLog, LogTable, Row, as_string, paths_in
 from davinci_forces.study.names import is_time
 from davinci_forces.study.roles import Evidence, roles_of
@@ -121,6 +121,8 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     log = open_log(files[0])
     holding = guess(log, listed)
     touching = tissue_channels([channel for channel in log.channels if not is_time(channel)])
+    if holding.meanings and holding.is_to_check and is_tissue([*touching.values()]):  # names tell more than values
+        holding = Holding(timing=holding.timing)
     touching = {name: quantity for name, quantity in touching.items() if name not in holding.meanings}
     if holding.meanings:
         return DraftLog(files, log, holding, {}, force_sensor(touching))

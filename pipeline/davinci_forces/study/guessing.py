@@ -89,6 +89,11 @@ class Holding:
         return replace(self, meanings=meanings)
 
     @property
+    def is_to_check(self) -> bool:
+        """Whether what each channel holds is a guess by its values."""
+        return all(meaning.reason.startswith("CHECK") for meaning in self.meanings.values())
+
+    @property
     def has_named_joints(self) -> bool:
         """Whether names tell the joints."""
         by_name = {meaning.reason for meaning in self.meanings.values()} & {BY_FILE, BY_NUMBER}
