@@ -14,6 +14,7 @@ from davinci_forces.maths.models.terms import OF_MOTION, TERMS, presliding_frict
 from davinci_forces.records import Fit
 from davinci_forces.robots.models import coupled_arm, independent
 from davinci_forces.robots.robot import Robot
+from davinci_forces.study import Study
 
 RATE = 100.0
 NOISE = NoiseModel(1e-4, 1e-3, 0.0, 2e-2, 3e-2)
@@ -77,6 +78,7 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
     study.settings = SimpleNamespace(lowpass=17.0)
     measured = SimpleNamespace(joint=robot.joints[0].name, symbol="i")
     study.logs = [SimpleNamespace(channels=[measured])]
+    study.joints_by_current = Study.joints_by_current.fget(study)
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1.0 / RATE)
     band = {"edges": [0.1, 0.3, 0.6], "factor": [0.9, 1.0, 1.2, 1.4], "model_variance": 0.02}
     Q = [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]]

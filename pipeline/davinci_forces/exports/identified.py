@@ -94,10 +94,10 @@ class Export:
             ranges = zip(UNITS, joint.validity.values(), units, strict=True)
             text = ", ".join(f"{name} {low:.5g} to {high:.5g} {unit}" for name, (low, high), unit in ranges)
             lines.append(f"  {joint.name}: {text}")
-        by_current = {source.joint for log in study.logs for source in log.channels if source.symbol == "i"}
-        for motor in (each.joint for each in self.joints if each.name in by_current and not each.joint.effort):
-            gain = motor.gear_ratio * motor.torque_constant
-            lines.append(f"  {motor.name}: 1 A of its motor counts as {gain:.6g} {motor.unit('{effort}')}")
+        exported = {joint.name for joint in self.joints}
+        for motor in (joint for joint in study.joints_by_current if joint.name in exported):
+            counts = f"{motor.effort_per_ampere:.6g} {motor.unit('{effort}')}"
+            lines.append(f"  {motor.name}: 1 A of its motor counts as {counts}")
         lines += self.remarks()
         for fit in fits:
             rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)

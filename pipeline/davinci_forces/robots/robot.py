@@ -90,6 +90,11 @@ class Joint:
         return self.kind.unit(template, self.effort)
 
     @property
+    def effort_per_ampere(self) -> float:
+        """The effort of the joint [N m/A, or N/A] by the current of its motor."""
+        return self.gear_ratio * self.torque_constant
+
+    @property
     def dependence(self) -> Lumping | None:
         """The dependence of its parameters on physical ones; None if these are unknown or make other parameters up."""
         names = tuple(term.name for term in self.terms)

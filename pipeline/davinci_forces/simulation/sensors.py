@@ -38,7 +38,7 @@ def record(
     joint, N = simulated.joint, len(motion.q)
     angle, speed = (true + random.normal(0.0, sigma, N) for true, sigma in ((motion.q, noise.q), (motion.dq, noise.dq)))
     effort = motion.tau + random.normal(0.0, noise.tau, N) + drift(noise, rate, N, random)
-    current = quantise(effort / (joint.gear_ratio * joint.torque_constant), simulated.current_step)
+    current = quantise(effort / joint.effort_per_ampere, simulated.current_step)
     scale = 1e3 if current_unit == "mA" else 1.0
     return [
         SimulatedChannel(f"{joint.name}.theta_m", f"{simulated.label} motor angle", "rad",

@@ -8,7 +8,7 @@ from typing import Any
 from davinci_forces.haptics.scenario import HapticScenario as HapticScenario
 from davinci_forces.logs.log import Options as Options
 from davinci_forces.maths.constants import PUSH_DELAY
-from davinci_forces.robots.robot import Robot
+from davinci_forces.robots.robot import Joint, Robot
 
 WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
@@ -140,6 +140,12 @@ class Study:
     def name(self) -> str:
         """The folder's name."""
         return self.folder.resolve().name
+
+    @property
+    def joints_by_current(self) -> tuple[Joint, ...]:
+        """The joints whose motor currents become efforts by gear ratio and torque constant."""
+        measured = {source.joint for entry in self.logs for source in entry.channels if source.symbol == "i"}
+        return tuple(joint for joint in self.robot.joints if joint.name in measured and not joint.effort)
 
     def log(self, name: str) -> LogEntry:
         """The log of that name."""

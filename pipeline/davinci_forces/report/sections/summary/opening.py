@@ -113,12 +113,9 @@ def logs_in_words(context: Context) -> str:
 
 def currents_in_words(context: Context) -> str:
     """State by which constants motor currents became efforts; "" if none did."""
-    measured = {source.joint for log in context.study.logs for source in log.channels if source.symbol == "i"}
     factors = [
-        f"{Number(joint.gear_ratio * joint.torque_constant, joint.unit('{effort}'), digits=3)} on "
-        f"{name_in_sentence(joint.name)}"
-        for joint in context.study.robot.joints
-        if joint.name in measured and not joint.effort
+        f"{Number(joint.effort_per_ampere, joint.unit('{effort}'), digits=3)} on {name_in_sentence(joint.name)}"
+        for joint in context.study.joints_by_current
     ]
     return f" 1 A of a motor counts as {as_list(factors)}." if factors else ""
 
