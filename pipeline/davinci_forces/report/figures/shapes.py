@@ -1,12 +1,12 @@
 """Shapes and words of a picture as SVG, in points; whole paths in few characters."""
 
-from collections.abc import Iterator
 from html import escape
 from itertools import pairwise
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array
+from davinci_forces.report.content.thinning import stretches
 
 POINT = 72 / 25.4  # points in a millimetre
 LONG = 200  # points of a path whose steps are in tenths of a point, not hundredths
@@ -19,14 +19,7 @@ def trace(x: Array, y: Array, closed: bool = False) -> str:
     """The path through points [pt], interrupted where one is not finite, in relative steps."""
     scale = 10 if len(x) > LONG else 100
     ends = "z" if closed else ""
-    return "".join(_run(x[run], y[run], scale) + ends for run in _runs(np.isfinite(x) & np.isfinite(y)))
-
-
-def _runs(known: Booleans) -> Iterator[slice]:
-    """The stretches of samples that are known."""
-    edges = np.flatnonzero(np.diff(np.r_[0, known.astype(np.int8), 0]))
-    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        yield slice(start, end)
+    return "".join(_run(x[run], y[run], scale) + ends for run in stretches(np.isfinite(x) & np.isfinite(y)))
 
 
 def _run(x: Array, y: Array, scale: int) -> str:

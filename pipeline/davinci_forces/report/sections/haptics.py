@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HapticResponse, HapticRun
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
 from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine, VSpan
+from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
 
@@ -81,10 +80,8 @@ def traces(context: Context, run: HapticRun) -> Figure:
 
 def spans(run: HapticRun) -> Iterator[AnyMark]:
     """The contacts of a run."""
-    touched = np.concatenate([[False], run.true_force > 0.0, [False]])
-    edges = np.flatnonzero(touched[1:] != touched[:-1])
-    for i, (start, end) in enumerate(edges.reshape(-1, 2).tolist()):
-        yield VSpan(float(run.t[start]), float(run.t[min(end, len(run) - 1)]), "" if i else "contact")
+    for i, touched in enumerate(stretches(run.true_force > 0.0)):
+        yield VSpan(float(run.t[touched.start]), float(run.t[min(touched.stop, len(run) - 1)]), "" if i else "contact")
 
 
 def response_figure(response: HapticResponse) -> Figure:

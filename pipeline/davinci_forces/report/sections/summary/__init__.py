@@ -20,7 +20,8 @@ from davinci_forces.records import (
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
-from davinci_forces.report.content.marks import HBand, Line, Points, VSpan
+from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
+from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import grade_of_mass, scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
@@ -33,6 +34,8 @@ COMES_FIRST = re.compile(r"check the units|its external effort is not estimated"
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
+TOUCHED: Colour = "sky"  # of contact windows
+REST: Colour = "yellow"  # of standstill
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
@@ -101,7 +104,7 @@ def caption(contacts: list[Contact], panels: list[Panel]) -> str:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
     which *= len({contact.log for contact in contacts}) > 1
-    is_shaded = any(isinstance(mark, VSpan) and mark.colour == "sky" for panel in panels for mark in panel.marks)
+    is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
     return f"External effort of each joint{shaded}. {which}{level}"
 
@@ -132,8 +135,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
         small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
         doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
-        found = "found above the alarm level, which free motion crosses at most once in ten minutes"
-        text = f"{text} **{unstated} {found}; the study states none.{peaks}**"
+        level = "the alarm level, which free motion crosses at most once in ten minutes"
+        text = f"{text} **{unstated} found above {level}; the study states none.{peaks}**"
         return f"{text}{doubt}" if small else text
     outside = (
         "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
@@ -178,15 +181,14 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     logs = [log for log in by_error if len(touched[log]) == 1] or by_error
     logs = logs or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
-        spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
+        spans = [VSpan(start, end, "", TOUCHED) for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
         converged = track.t - track.t[0] >= 1.0
         line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], track.standing > 0, [0]]))).reshape(-1, 2)
         still = [
-            VSpan(float(track.t[start]), float(track.t[end - 1]), "" if i else "at rest: not judged", "yellow")
-            for i, (start, end) in enumerate(edges)
+            VSpan(float(track.t[part][0]), float(track.t[part][-1]), "" if i else "at rest: not judged", REST)
+            for i, part in enumerate(stretches(track.standing > 0))
         ]
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
