@@ -47,7 +47,8 @@ ONLY_AFTER = {
 IN_BRACKETS = re.compile(r"(?<=\S)\s*[\[({]\s*([^\[\](){}]*?)\s*[\])}]")
 INDEX = re.compile(r"\d*|[^\W\d]\w*_\w*|[^\W\d]+ ?\d+")  # `q[0]`, `effort[outer_yaw]`, `q (joint 1)`
 RATE = re.compile(r"[\s,_]+([^\W\d_]+|°)$")  # of `speed deg`, before a slash and a time
-GROUP = re.compile(r"/(?![^\[({]*[\])}])")  # a slash after the name of a group: not one in brackets
+OUTSIDE = r"(?![^\[({]*[\])}])"  # what precedes this is not in brackets
+GROUP = re.compile(f"/{OUTSIDE}")  # a slash after the name of a group
 CAPITAL = re.compile(r"(?<=[a-z]{3})(?=m(?:A|Nm?)$)|(?<=[a-z])(?=[A-Z])")  # `currentmA`, `angleDeg`
 
 

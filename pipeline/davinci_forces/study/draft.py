@@ -76,8 +76,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
     drawn = _same_currents(drawn)
-    texts = [draft.files[0].resolve().relative_to(folder.resolve()).as_posix() for draft in drawn]
-    guesses = belonging.with_joints_of_files([draft.guess for draft in drawn], texts, arms)
+    paths = paths_in([draft.files[0] for draft in drawn], folder)
+    guesses = belonging.with_joints_of_files([draft.guess for draft in drawn], paths, arms)
     drawn = [replace(draft, guess=holding) for draft, holding in zip(drawn, guesses, strict=True)]
     channels = [channel.alias or channel.name for draft in drawn for channel in draft.log.channels]
     names = [folder.resolve().name, *(file.name for file in files), *channels]

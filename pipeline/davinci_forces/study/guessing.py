@@ -83,10 +83,11 @@ class Holding:
             courses={joints[k]: course for k, course in self.courses.items()},
         )  # fmt: skip
 
-    def to_check(self, what: str) -> "Holding":
-        """The same with something to be checked of each channel."""
-        meanings = {n: replace(m, reason=f"CHECK: {what}; {m.reason}") for n, m in self.meanings.items()}
-        return replace(self, meanings=meanings)
+    def to_check(self, what: str = "") -> "Holding":
+        """The same with each channel to be checked, and what of it."""
+        reasons = {name: m.reason.removeprefix("CHECK: ") for name, m in self.meanings.items()}
+        mark = f"CHECK: {what}; " if what else "CHECK: "
+        return replace(self, meanings={n: replace(m, reason=mark + reasons[n]) for n, m in self.meanings.items()})
 
     @property
     def is_to_check(self) -> bool:
@@ -123,12 +124,9 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     content = _by_content(log, [channel.name for channel in numbers if channel.name != log.time])
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
         return content
-    untold = bool(content.meanings) and not any(
-        symbol_of(words_of(channel.name)) for channel in numbers
-    )  # as of `Untitled 1`
-    if untold or any(robot.file and len(robot.joints) == content.joints for robot in robots):
-        reasons = {name: f"CHECK: {m.reason.removeprefix('CHECK: ')}" for name, m in content.meanings.items()}
-        return replace(content, meanings={n: replace(m, reason=reasons[n]) for n, m in content.meanings.items()})
+    named = any(symbol_of(words_of(channel.name)) for channel in numbers)  # not as `Untitled 1`
+    if (content.meanings and not named) or any(r.file and len(r.joints) == content.joints for r in robots):
+        return content.to_check()
     times = [channel.name for channel in numbers if is_time(channel)]
     samples = {name: samples_of(log, [name])[name] for name in times}
     timing = timing_of(log, samples, [], unnamed=False)  # names whose meaning we do not know
@@ -173,7 +171,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
         symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
         if len(joints) != 1 or not symbol:
             continue
-        symbol = _side(symbol, words, channel, robot.joints[joints[0]])
+        symbol = _side(symbol, words, channel.unit, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
             meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name")
     with_position = {m.joint for m in meanings.values() if m.symbol in POSITIONS}
@@ -192,11 +190,9 @@ def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: in
     for robot in robots:
         joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, name)]
         if len(joints) == 1:
-            named, [k] = holding.with_joints(joints), joints
-            slides = robot.joints[k].kind is Kind.PRISMATIC
-            at_motor = {n for n, m in named.meanings.items() if slides and is_angle(holding.units.get(n, ""))}
+            named, joint = holding.with_joints(joints), robot.joints[joints[0]]
             meanings = {
-                n: replace(m, symbol=AT_MOTOR.get(m.symbol, m.symbol) if n in at_motor else m.symbol, reason=BY_FILE)
+                n: replace(m, symbol=_side(m.symbol, (), holding.units.get(n, ""), joint), reason=BY_FILE)
                 for n, m in named.meanings.items()
             }
             return replace(named, joints=len(robot.joints), meanings=meanings, robot=robot, labels=())
@@ -212,9 +208,9 @@ def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
     return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
 
 
-def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> str:
+def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    motor = "motor" in words or (is_angle(channel.unit) and joint.kind is Kind.PRISMATIC)
+    motor = "motor" in words or (is_angle(unit) and joint.kind is Kind.PRISMATIC)
     return AT_MOTOR.get(symbol, symbol) if motor else symbol
 
 

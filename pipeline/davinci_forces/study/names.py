@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from davinci_forces.logs.log import Channel
-from davinci_forces.maths.units import canonical, measures
+from davinci_forces.maths.units import OUTSIDE, canonical, measures
 
 # Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
 SIGNAL_WORDS = {
@@ -41,7 +41,7 @@ PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "meas
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
 TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
-PARTS = re.compile(r"([/.])(?![^\[({]*[\])}])")  # not the slash of `speed (rad/s)`
+PARTS = re.compile(f"([/.]){OUTSIDE}")  # not the slash of `speed (rad/s)`
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 # Joints of the da Vinci Research Kit by its own labels, of which those of the slide are usual for any da Vinci arm.
 INSERTION_WORDS = {"insertion", "ins"}
