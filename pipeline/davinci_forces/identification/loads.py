@@ -94,12 +94,9 @@ def periods_of(
     """The rows of each almost whole period of a path, in `count` parts, of a load and an effort with their times."""
     rows = []
     for period in range(int((load[0][-1] - first) // length) + 1):
-        start = first + period * length
-        inside = [(t >= start) & (t < start + length) for t, _ in (load, tau_ext)]
-        x, y = (
-            path_means(t[part], values[part], first, length, count)
-            for part, (t, values) in zip(inside, (load, tau_ext), strict=True)
-        )
+        ends = (first + period * length, first + (period + 1) * length)
+        inside = [(t, values, slice(*np.searchsorted(t, ends))) for t, values in (load, tau_ext)]
+        x, y = (path_means(t[part], values[part], first, length, count) for t, values, part in inside)
         both = np.isfinite(x) & np.isfinite(y)
         if both.sum() > MIN_WHOLE * count:
             rows.append(Rows(x[both], y[both], np.zeros(int(both.sum()), np.int64)))

@@ -129,7 +129,7 @@ def gather(
         carrying = [load for load in usable if load.weight == weighing.log == load.log]
         others = [load for load in usable if load.weight == weighing.log != load.log]
         of_tare = [load for load in others if load.log == weighing.tare]
-        spread = errors_between(carrying, of_tare if weighing.tare else [], others)
+        spread = errors_between(carrying, of_tare, others)
         tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
         constants = [*torque_constants(weighing, carrying, tare, others, robot, spread)]
         yield from constants
@@ -141,8 +141,8 @@ def gather(
             if carrying:
                 message = "the efforts of the joints that carry the mass are currents"
                 remedy = "state their torque_constant, which a log of a known mass gives"
-                given = [x for x in constants if isinstance(x, TorqueConstant)]
-                if values := [f"torque_constant = {x.torque_constant:.4g} for {x.joint}" for x in given]:
+                records = [record for record in constants if isinstance(record, TorqueConstant)]
+                if values := [f"torque_constant = {of.torque_constant:.4g} for {of.joint}" for of in records]:
                     remedy = f"this known mass gives {join_names(values)}; write each in "
                     remedy += '[robot_overrides.<joint>] of study.toml, in place of effort = "A"'
             text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
