@@ -5,9 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import lsq_linear
 from scipy.special import stdtrit
 
-from davinci_forces.identification import model_error
+from davinci_forces.identification import chosen, model_error
 from davinci_forces.identification.candidates import Candidate, CandidatePart, CellEquations, Library
 from davinci_forces.maths import selection
 from davinci_forces.maths.models import terms
@@ -197,3 +199,25 @@ def test_parameters_that_no_data_separate_have_errors_that_a_ridge_does_not_hide
     assert std[0] < 0.02
     assert (std[1:] > 1.0).all()
     assert (model_error.squares_of_ridge(part.with_ridge(0.0), theta, noise) == 0.0).all()
+
+
+def test_parameters_with_the_least_inertia_are_the_best_of_all_with_at_least_that_one():
+    """An inertia that the data make negative; its column is a hundred times as long as the others."""
+    rng = np.random.default_rng(5)
+    q = rng.normal(size=600)
+    Phi = np.column_stack([100.0 * (rng.normal(size=600) + q), rng.normal(size=600), q])
+    tau = Phi @ [-0.02, 1.0, 0.5] + rng.normal(0.0, 0.1, 600)
+    equations = sum_equations(Phi[:, None], tau[:, None], np.arange(600) * PATH_BLOCKS // 600, PATH_BLOCKS)
+    model = IndependentJoint("one", (terms.inertia, terms.viscous, terms.stiffness), ("",) * 3)
+    log = SimpleNamespace(block=np.zeros(600), records=[SimpleNamespace(q=q)])
+    library = Library(model, (log,), CellEquations(np.array([600]), equations, equations, equations))  # type: ignore[arg-type]
+    part = CandidatePart(model, library, [0, 1, 2], Ridge(0.0, np.ones(1), np.empty((0, 0))))
+    theta = solve(sum_all(equations), part.ridge)
+    free = chosen.BlockEstimate(theta, *np.zeros((4, 3)), samples=600, condition=1.0, **chosen.scores(part, theta))
+    found = chosen.fit_consistent(part, free)
+    least = 1e-3 * np.linalg.norm(tau) / np.linalg.norm(Phi[:, 0])
+    best = lsq_linear(Phi, tau, bounds=([least, 0.0, -np.inf], np.inf), tol=1e-12)
+    assert_allclose(found.estimate.theta, best.x, rtol=1e-6)
+    squares = [np.sum((tau - Phi @ theta) ** 2) for theta in (best.x, free.theta)]
+    assert_allclose(found.excess, (squares[0] - squares[1]) / (tau @ tau), rtol=1e-6)
+    assert_allclose([found.rmse, found.rmse_free], np.sqrt(np.array(squares)[:, None] / 600), rtol=1e-6)
