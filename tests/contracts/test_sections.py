@@ -224,6 +224,17 @@ def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, ca
     assert verdicts(replace(full, catalogue=with_remark)) == [("info", "1 of 2 logs were read without a remark.")]
 
 
+def test_of_remarks_that_differ_in_log_and_numbers_paper_has_the_first(full: Context, catalogue: Catalogue):
+    texts = [f"log_{i}/hand_roll: it stands still from {i}.00 to 9.00 s" for i in range(3)]
+    remarks = [diagnostic("resample", f"log_{i}.hand_roll", "note", text) for i, text in enumerate(texts)]
+    records = Catalogue(lambda kind: remarks if kind is Diagnostic else catalogue.records(kind))
+    blocks = [*runs.recording_blocks(replace(full, catalogue=records), full.catalogue.records(LogSummary))]
+    printed = [item for block in blocks if isinstance(block, Bullets) for item in block.items if "stands" in item]
+    assert printed == [f"{texts[0]} (2 more remarks of this kind)"]
+    [hidden] = [block.blocks for block in blocks if isinstance(block, OnScreen) and block.anchor == "all-remarks"]
+    assert [len(items.items) for items in hidden if isinstance(items, Bullets)] == [3]
+
+
 def test_why_logs_have_no_force_at_the_tip_is_stated_also_where_no_log_has_one(full: Context, catalogue: Catalogue):
     remark = diagnostic("resolve", "push", "note", "push: no force at the tip: it has 4 joints")
     records = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
@@ -412,6 +423,20 @@ def test_a_unit_fault_that_the_filter_finds_comes_before_harmonics_and_a_small_h
     assert looks.index(remarks["differentiate"]) == place
 
 
+@pytest.mark.parametrize(("value", "is_told"), [(-0.3, True), (-0.1, False), (0.3, False)])
+def test_page_one_names_a_parameter_of_the_used_model_that_no_mechanism_has(full: Context, value: float, is_told: bool):
+    used = full.used_record("hand_roll") or full.fit_named(full.own_fit("hand_roll"), "hand_roll")
+    assert used is not None
+    row = int(np.flatnonzero(used.positive)[0])
+    values = {name: getattr(used, name).copy() for name in ("theta", "theta_std")}
+    values["theta"][row], values["theta_std"][row] = value, 0.1
+    fits = [replace(used, **values) if fit is used else fit for fit in full.catalogue.records(Fit)]
+    about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))
+    name = joints.of_joint(used, "hand_roll")[row]
+    told = [text for _, text in summary.looks_at_parameters(about, "hand_roll") if f"negative {name}" in text]
+    assert len(told) == is_told
+
+
 def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: Context):
     [trust] = trusts(full, hand_roll=0.05)
     assert trust.space is not None
@@ -421,6 +446,16 @@ def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: C
     [wrong] = trusts(full, hand_roll=1.0)
     [(_, text)] = summary.looks_at_band(full, replace(wrong, space=narrow.space))
     assert "it covers only 30 % of free-space samples. See" in text
+
+
+def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Context):
+    [contact, *_] = full.catalogue.records(Contact)
+    twice = Catalogue(lambda kind: [contact, contact] if kind is Contact else full.catalogue.records(kind))
+    [table] = [b for b in walk(written("contacts", replace(full, catalogue=twice))) if name_of(b) == "contact-table"]
+    assert [row[2] for row in table.rows] == [str(number) for number in range(1, 2 * len(contact) + 1)]
+    [panel] = contacts_section.peaks(full, [contact, contact]).panels
+    [marked] = [mark for mark in panel.marks if isinstance(mark, Points)]
+    assert marked.x.tolist() == [int(row[2]) for row in table.rows]
 
 
 def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):

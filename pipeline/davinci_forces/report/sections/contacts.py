@@ -1,6 +1,7 @@
 """Every contact with its effort and error, against the detection level; and recordings that are not analysed."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -38,15 +39,20 @@ def section(context: Context) -> Iterator[Block]:
         )
         yield peaks(context, contacts)
         caption = (
-            f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
+            f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. No.: "
+            "number of the window in [@contact-peaks]. "
             "Interval: 95 % confidence interval of the peak, not below that of the mean. Verdict: whether the peak "
             "exceeds the detection level; “peak only” if it does but stays below the alarm level; “found” for a "
             "contact outside the windows that the study states, and “small” if its peak is below twice the alarm "
             "level, so that it may be an error of the model."
         )
-        header = ("Log", "Joint", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
-        of_contacts = [row for contact in contacts for row in rows(context, contact)]
-        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
+        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
+        earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
+        of_contacts: list[tuple[Cell, ...]] = []
+        for contact in contacts:
+            of_contacts += rows(context, contact, earlier[contact.joint])
+            earlier[contact.joint] += len(contact)
+        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(
@@ -72,13 +78,14 @@ def largest(contacts: list[Contact]) -> tuple[int, ...]:
     return tuple(sorted(np.argsort(-ratios, kind="stable")[:PRINTED].tolist()))
 
 
-def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
-    """One row a window."""
+def rows(context: Context, contact: Contact, earlier: int) -> Iterator[tuple[Cell, ...]]:
+    """One row a window, numbered after the `earlier` ones of its joint."""
     for i in range(len(contact)):
         key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
         onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
         plain = peak if isinstance(peak, str) else replace(peak, std=None)  # as the interval has its error
-        yield (*run_cells(contact), onset, release, plain, interval(peak, mean), mean, impulse, verdict(contact, i))
+        number, limits = str(earlier + i + 1), interval(peak, mean)
+        yield (*run_cells(contact), number, onset, release, plain, limits, mean, impulse, verdict(contact, i))
 
 
 def interval(peak: Number | str, mean: Number | str) -> str:
@@ -106,7 +113,7 @@ def peaks(context: Context, contacts: list[Contact]) -> Figure:
     total = sum(len(contact) for contact in contacts)
     caption = (
         "The peak of every window with its standard error. Peaks in the grey band, below the detection level, cannot "
-        "be distinguished from free space. Windows are in the order of [@contact-table]."
+        "be distinguished from free space. [@contact-table] has the window of each number."
     )
     alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
     panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))

@@ -36,7 +36,8 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "once it is removed, the tests pass with p-values at least a hundred times larger. They must fail if as many "
         "samples are left out elsewhere. Of other causes the share of the correlation is stated. "
         "The filter's random walk is chosen to follow pushes. In free motion this walk is larger than "
-        "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
+        "necessary, so the innovations are slightly correlated. Bands, levels and standard errors of efforts do not "
+        "rest on white innovations, since they are calibrated on free motion.\n\n" + summary(explained)
     )
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}

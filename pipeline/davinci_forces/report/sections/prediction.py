@@ -32,7 +32,8 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
         "both low-passed, after the noise variance is subtracted. "
         "Samples at which the joint stands still are left out, as friction can then take any value. A contact log "
-        "whose windows the study does not state is scored with its contacts, so it is no worst run."
+        "whose windows the study does not state is scored with its contacts, so it is no worst run. A large error of "
+        "an identification log whose path is mostly new says that no other log replaces it, not that the fit is bad."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")

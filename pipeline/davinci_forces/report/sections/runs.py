@@ -2,7 +2,16 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
+from davinci_forces.records import (
+    Diagnostic,
+    Explanation,
+    FilterNoise,
+    FreeSpace,
+    LogSummary,
+    Signal,
+    Track,
+    first_of_each_kind,
+)
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
@@ -117,7 +126,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     """One table over all logs, and the remarks of the readers and of the first stages."""
     yield from parts.paper_or_screen(overview(context, summaries))
     diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("ingest", "resample", "average")]
-    remarks_of_stages = [literal(text) for diagnostic in diagnostics for text in diagnostic.text]
+    of_stages = [(diagnostic.stage, text) for diagnostic in diagnostics for text in diagnostic.text]
     remarked = {summary.log: texts for summary in summaries if (texts := log_remarks(summary))}
     followed = {diagnostic.subject.partition(".")[0] for diagnostic in diagnostics}  # logs with remarks of the stages
     if clean := len({summary.log for summary in summaries} - followed - set(remarked)):
@@ -134,12 +143,16 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         sources = ((method, "as logged" if velocity == "logged" else derived) for method, velocity in methods)
         yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
         yield Bullets(tuple(f"clock: {method}; velocity: {source}" for method, source in sources))
-    if remarks_of_stages:
+    if of_stages:
         yield Prose(
-            "Remarks of the file readers and of the stages `ingest`, `resample` and `average`; `davinci-forces guide "
-            "messages` explains them:"
+            "Remarks of the file readers and of the stages `ingest`, `resample` and `average`, the first of each kind; "
+            "`davinci-forces guide messages` explains them:"
         )
-        yield Bullets(tuple(remarks_of_stages))
+        first = tuple(literal(text) for _, text in first_of_each_kind(of_stages))
+        yield Bullets(first)
+        if len(first) < len(of_stages):
+            every = Bullets(tuple(literal(text) for _, text in of_stages))
+            yield OnScreen(f"All {len(of_stages)} remarks", "all-remarks", (every,))
     of_the_tip = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("resolve", "sense")]
     if left_out := tuple(literal(text) for diagnostic in of_the_tip for text in diagnostic.text):
         yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(left_out),))

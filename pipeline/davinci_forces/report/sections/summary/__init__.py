@@ -23,6 +23,7 @@ from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, P
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
+from davinci_forces.report.sections.joints import of_joint
 from davinci_forces.report.sections.parts import grade_of_mass, scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
@@ -263,6 +264,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     """Yield every caveat with its weight; 1 is where caution begins."""
     for trusted in trusts:
         yield from looks_at_model(context, trusted)
+        yield from looks_at_parameters(context, trusted.joint)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
     yield from looks_at_speeds(context, [trusted.joint for trusted in trusts])
@@ -340,6 +342,19 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         text += f"that of a good model is at most {percent(verdicts.GOOD)}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
+
+
+def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, str]]:
+    """Yield a caveat if the model in use has parameters that no mechanism has."""
+    fit = context.used_record(joint) or context.fit_named(context.own_fit(joint), joint)
+    if fit is None:
+        return
+    impossible = [verdicts.is_impossible(*of) for of in zip(fit.theta, fit.theta_std, strict=True)]
+    if wrong := [name for i, name in of_joint(fit, joint).items() if fit.positive[i] and impossible[i]]:
+        text = f"the model in use has a negative {as_list(wrong)}, which no mechanism has. It predicts the effort as "
+        text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
+        text += "study.toml, `fit = 'independent.consistent'`."
+        yield WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
