@@ -373,6 +373,7 @@ def test_a_tare_of_another_path_is_not_subtracted_and_that_is_said():
     weight, _, said = study(3, tare="empty", tare_path=0.8)
     assert weight.tare == ""
     assert np.isnan(weight.tare_mass)
+    assert weight.mass_std == study(3, tare_path=0.8)[0].mass_std  # without the spread of what is not subtracted
     assert any("heavy: its tare empty is not on the same path: at best it is off by" in text for text in said)
 
 
@@ -558,13 +559,13 @@ def test_a_constant_that_the_mass_hardly_shows_is_not_proposed(monkeypatch):
     assert precise["hand_roll"] <= 0.06
 
 
-def test_a_negative_constant_asks_for_the_sign_of_the_current():
+def test_a_known_mass_that_appears_negative_gives_no_constant():
     channels = tuple(replace(source, sign=-1) for source in CURRENTS)
     driven = replace(ROBOT, joints=tuple(replace(joint, gear_ratio=-GEAR, effort="A") for joint in ROBOT.joints))
     logs = [log("fitted", "identification", 100), log("heavy", "weight", 300, HUNG.position)]
     made, said = weighed(logs, Weighing("heavy", HUNG, ""), driven, channels)
-    assert [record.torque_constant < 0 for record in made if isinstance(record, TorqueConstant)] == [True, True]
-    assert sum("check the sign of the current" in text for text in said) == 2
+    assert [record for record in made if isinstance(record, TorqueConstant)] == []
+    assert sum("the known mass appears negative" in text for text in said) == 2
 
 
 def test_the_error_of_a_mass_pools_the_run_with_free_motion_and_widens_by_what_that_shows():

@@ -70,6 +70,9 @@ from davinci_forces.report.sections import (
 from davinci_forces.report.sections import (
     contacts as contacts_section,
 )
+from davinci_forces.report.sections import (
+    weight as weight_section,
+)
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
@@ -435,6 +438,32 @@ def test_page_one_names_a_parameter_of_the_used_model_that_no_mechanism_has(full
     name = joints.of_joint(used, "hand_roll")[row]
     told = [text for _, text in summary.looks_at_parameters(about, "hand_roll") if f"negative {name}" in text]
     assert len(told) == is_told
+
+
+def test_a_negative_lifted_mass_reverses_the_direction_of_its_joint(full: Context):
+    used = full.used_record("hand_roll") or full.fit_named(full.own_fit("hand_roll"), "hand_roll")
+    assert used is not None
+    names, theta = used.parameter.copy(), used.theta.copy()
+    row = int(np.flatnonzero(used.positive)[0])
+    suffix = names[row].removeprefix(joints.of_joint(used, "hand_roll")[row])
+    names[row], theta[row] = f"lifted mass{suffix}", -10.0 * used.theta_std[row]
+    fits = [replace(used, parameter=names, theta=theta) if fit is used else fit for fit in full.catalogue.records(Fit)]
+    about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))
+    [(first, text)] = summary.looks_at_parameters(about, "hand_roll")
+    assert first == summary.FIRST
+    assert "write `sign = -1` with its position, velocity and effort, all three" in text
+
+
+def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Context):
+    [of, *_] = full.catalogue.records(Weight)
+    shown = np.array([0.1, -0.3])
+    two = {name: np.repeat(getattr(of, name)[:1], 2) for name in of.columns()}
+    two |= {"loaded": np.array(["hand_roll", "instrument_slide"], object), "mass_alone": shown}
+    turned = replace(of, mass=-0.1, mass_std=0.001, differing="", side="not told", **two)
+    assert weight_section.turned_joint(turned) == "instrument_slide"
+    verdict = weight_section.verdict(full, turned)
+    assert verdict.level == "warn"
+    assert "the positive direction of the instrument slide is not that of the robot's chain" in verdict.text
 
 
 def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: Context):

@@ -179,6 +179,8 @@ def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, l
     exact = {"mass": 0.097, "mass_std": 0.001, "stated_mass": 0.097}
     assert mass_level(weight(**exact, side="the other one"), []) == ("warn", "side")
     assert mass_level(weight(**exact, differing="roll"), []) == ("warn", "joints")
+    for known in (0.097, float("nan")):
+        assert mass_level(weight(mass=-0.09, mass_std=0.04, stated_mass=known), []) == ("warn", "sign")
 
 
 @pytest.mark.parametrize(
@@ -195,6 +197,14 @@ def test_a_mass_that_differs_from_the_stated_one_is_to_be_looked_at_first(mass, 
     context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
     told = [text for _, text in summary.looks_at_masses(context)]
     assert told == ["**hung**: the mass is estimated 3 % too large, by 3.0 standard errors. See [@weight]."] * is_told
+
+
+def test_a_negative_mass_is_to_be_looked_at_before_all_that_it_spoils():
+    of = weight(log="hung", mass=-0.103, mass_std=0.001, stated_mass=0.1)
+    context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
+    [(first, text)] = summary.looks_at_masses(context)
+    assert first == summary.FIRST
+    assert text == "**hung**: the mass is negative, so a direction is reversed. See [@weight]."
 
 
 def test_of_motions_faster_than_all_fitted_ones_the_fastest_is_to_be_looked_at():

@@ -24,6 +24,7 @@ from davinci_forces.report.content import Cell, Level
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
+TURN = "write `sign = -1` with its position, velocity and effort, all three"
 SAME_MASS = 0.01  # share of a stated mass: torque constants are not known better
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
@@ -171,6 +172,8 @@ def mass_level(weight: Weight, constants: Sequence[TorqueConstant]) -> tuple[Lev
         return "warn", "side"
     if weight.differing:
         return "warn", "joints"
+    if is_impossible(weight.mass, weight.mass_std):
+        return "warn", "sign"
     if math.isnan(weight.stated_mass):
         return "info", "unstated"
     if any(is_taken(constant) for constant in constants if constant.log == weight.log):

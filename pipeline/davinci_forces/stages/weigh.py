@@ -129,8 +129,8 @@ def gather(
         carrying = [load for load in usable if load.weight == weighing.log == load.log]
         others = [load for load in usable if load.weight == weighing.log != load.log]
         of_tare = [load for load in others if load.log == weighing.tare]
-        spread = errors_between(carrying, of_tare, others)
         tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
+        spread = errors_between(carrying, of_tare if tare else (), others)
         constants = [*torque_constants(weighing, carrying, tare, others, robot, spread)]
         yield from constants
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
@@ -176,11 +176,13 @@ def torque_constants(
         apparent = MassEstimate(run.mass, pooled_std(run, free))
         if not load.is_current:
             continue
-        if not apparent.std <= MAX_RELATIVE_ERROR * abs(apparent.mass):
-            why = (
-                "its current shows the known mass too imprecisely for a torque constant, as where its axis is vertical"
+        if not apparent.std <= MAX_RELATIVE_ERROR * apparent.mass:
+            text = (
+                f"{load.log}/{load.joint}: its current shows the known mass too imprecisely for a torque constant, as "
+                "where its axis is vertical; take the constant from a data sheet, or pull with a known force"
             )
-            text = f"{load.log}/{load.joint}: {why}; take the constant from a data sheet, or pull with a known force"
+            if apparent.std <= -MAX_RELATIVE_ERROR * apparent.mass:
+                text = f"{load.log}/{load.joint}: the known mass appears negative, so it gives no torque constant"
             yield diagnostic("weigh", f"{load.log}.{load.joint}.torque-constant", "note", text)
             continue
         assert weighing.weight.mass
@@ -199,8 +201,6 @@ def proposal(record: TorqueConstant, gear_ratio: float) -> str:
         f"{record.log}/{record.joint}: the known mass of {record.stated_mass:g} kg gives torque_constant = "
         f"{value:.3g} ± {std:.2g} N m/A with gear_ratio = {gear_ratio:g}"
     )
-    if value < 0:
-        return f"{text}; it is negative, so check the sign of the current and the position of the mass"
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
     away = abs(value - used) / std

@@ -9,9 +9,9 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
-from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.context import Context, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
-from davinci_forces.report.verdicts import PRECISE, percent
+from davinci_forces.report.verdicts import PRECISE, TURN, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
@@ -107,6 +107,8 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     level, why = grade_of_mass(context, weight)
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
+        "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
+        f"that of the robot's chain. In study.toml {TURN}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": ". The study states no mass, so the scale of the efforts is not known.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
@@ -121,6 +123,11 @@ def verdict(context: Context, weight: Weight) -> Verdict:
 def worst_joint(weight: Weight) -> str:
     """The joint whose mass, alone, is furthest from the stated one in standard errors."""
     return str(weight.loaded[int(np.argmax(np.abs(weight.mass_alone - weight.stated_mass) / weight.mass_alone_std))])
+
+
+def turned_joint(weight: Weight) -> str:
+    """The joint that alone shows a negative mass most clearly."""
+    return str(weight.loaded[int(np.argmin(weight.mass_alone / weight.mass_alone_std))])
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from davinci_forces.maths.models.terms import lifted_mass
 from davinci_forces.records import (
     Contact,
     Diagnostic,
@@ -291,9 +292,12 @@ def omitted_share(spectrum: Spectrum) -> float:
 
 
 def looks_at_masses(context: Context) -> Iterator[tuple[float, str]]:
-    """Yield a caveat for each mass that differs from the stated one."""
+    """Yield a caveat for each mass that is negative, or differs from the stated one."""
     for weight in context.catalogue.records(Weight):
-        if grade_of_mass(context, weight)[1] == "scale":
+        why = grade_of_mass(context, weight)[1]
+        if why == "sign":
+            yield FIRST, f"**{literal(weight.log)}**: the mass is negative, so a direction is reversed. See [@weight]."
+        if why == "scale":
             share = abs(weight.mass / weight.stated_mass - 1.0)
             away = abs(weight.mass - weight.stated_mass) / weight.mass_std
             side = "large" if weight.mass > weight.stated_mass else "small"
@@ -354,7 +358,12 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
         text = f"the model in use has a negative {as_list(wrong)}, which no mechanism has. It predicts the effort as "
         text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
         text += "study.toml, `fit = 'independent.consistent'`."
-        yield WARNING, f"**{title(joint)}**: {text} See [@joints]."
+        if lifted_mass.name in wrong:
+            text = (
+                "its lifted mass is negative. Unless a counterweight lifts it, its positive direction, and with it the "
+            )
+            text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN}."
+        yield FIRST if lifted_mass.name in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
