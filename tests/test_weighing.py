@@ -373,8 +373,18 @@ def test_a_tare_of_another_path_is_not_subtracted_and_that_is_said():
     weight, _, said = study(3, tare="empty", tare_path=0.8)
     assert weight.tare == ""
     assert np.isnan(weight.tare_mass)
-    assert weight.mass_std == study(3, tare_path=0.8)[0].mass_std  # without the spread of what is not subtracted
     assert any("heavy: its tare empty is not on the same path: at best it is off by" in text for text in said)
+
+
+def test_a_tare_that_is_not_subtracted_adds_no_error():
+    logs = [
+        log("fitted", "identification", 100, drift=0.2),
+        log("empty", "validation", 300, path=0.8, drift=0.2),
+        log("heavy", "weight", 300, HUNG.position, drift=0.2),
+    ]
+    refused, plain = (analysed(logs, Weighing("heavy", HUNG, tare))[0] for tare in ("empty", ""))
+    assert refused.tare == ""
+    assert refused.mass_std == plain.mass_std
 
 
 def test_the_side_that_the_mass_does_not_hang_on_tells():
