@@ -182,7 +182,9 @@ class Threshold(JointRecord):
 class Contact(LogJointRecord):
     """The contacts of one joint in one log: its effort on the environment, and its detection level."""
 
-    PUBLISHED = ("contact.{log}.{joint}.{row}: peak± mean± impulse± onset± release± duration± above stated found",)
+    PUBLISHED = (
+        "contact.{log}.{joint}.{row}: peak± t_peak mean± impulse± onset± release± duration± above stated found",
+    )
 
     filter: str
     detection_level: float
@@ -196,7 +198,8 @@ class Contact(LogJointRecord):
     release_std: Column
     duration: Column
     duration_std: Column
-    peak: Column
+    t_peak: Column
+    peak: Column  # with half of what the smoother takes off the tip of a triangle
     peak_std: Column
     mean: Column
     mean_std: Column

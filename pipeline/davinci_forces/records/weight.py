@@ -31,6 +31,7 @@ class Weight(LogRecord):
     """The mass on the arm in one log, from the external effort of the joints that it loads."""
 
     ROWS = "loaded"
+    UNKNOWN = ("joint_offset", "joint_offset_std")  # where a constant effort cannot be told from the mass
     PUBLISHED = (
         "weight.{log}: mass± mass_mirrored± scale=mass_scale± tare_mass± run_std fit_std widening agreement "
         "agreement_mirrored birge_ratio",

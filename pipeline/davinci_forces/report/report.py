@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from davinci_forces.records import LogSummary, Stiffness
+from davinci_forces.records import Contact, LogSummary, Stiffness
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Document, Rated, Section, name_of, walk
@@ -17,7 +17,8 @@ from davinci_forces.report.results import MANIFEST, collect, identity, manifest
 from davinci_forces.report.sections import DOCUMENTS, section_builder
 from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.sections.parts import trust
-from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, trust_row
+from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, largest_peaks, trust_row
+from davinci_forces.report.sections.summary.opening import forces_at_tip, masses
 from davinci_forces.report.sections.tissue import verdict
 from davinci_forces.report.writers import render_all
 from davinci_forces.study import Study
@@ -71,16 +72,28 @@ def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
 
 
 def answer(context: Context) -> str:
-    """The table of verdicts and the three things to look at first, in plain text."""
+    """The table of verdicts, the three things to look at first, and what was measured, in plain text."""
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     stiffness = context.catalogue.records(Stiffness)
-    tissue = [f"tissue {plain(verdict(context, log).text)}" for log in stiffness]
+    measured = [plain(text) for text in (*forces_at_tip(context), *masses(context))]
+    measured += [f"tissue {plain(verdict(context, log).text)}" for log in stiffness]
     if not trusts:
         message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
-        return "\n".join([message, *tissue]) + "\n"
+        return "\n".join([message, *measured]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
+    contacts = (
+        [f"contacts, {peaks[1].lower()}{peaks[2:]}"]
+        if (peaks := largest_peaks(context, context.catalogue.records(Contact)))
+        else []
+    )
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
-    lines = [*align([HEADER, *rows]), LEGEND, *(["look at these first:", *looks] if looks else []), *tissue]
+    lines = [
+        *align([HEADER, *rows]),
+        LEGEND,
+        *(["look at these first:", *looks] if looks else []),
+        *contacts,
+        *measured,
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -44,7 +44,8 @@ def studies(names: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[
             if len(study.absent()) == study.files:
                 skipped.setdefault(_source(study), []).append(folder)
     for source, absent in skipped.items() if verbosity != "quiet" else ():
-        echo(f"{', '.join(map(str, absent))}: skipped, as none of their logs is here; {source}")
+        whose = "their" if absent[1:] else "its"
+        echo(f"{', '.join(map(str, absent))}: skipped, as none of {whose} logs is here; {source}")
     yield from (folder for folder in folders if not any(folder in absent for absent in skipped.values()))
 
 

@@ -124,8 +124,8 @@ def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str
 
 
 def unknown_files(folders: Folders, recorded: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Problems with links and unknown files among the results, and the unrelated files: those of the system, and
-    those in raw/ that no stage read.
+    """Problems with links and unknown files among the results, and the unrelated files in raw/, which no
+    stage read.
     """
     paths = {*recorded, f"raw/{review.FILE}"}
     problems: list[str] = []
@@ -140,9 +140,9 @@ def unknown_files(folders: Folders, recorded: Iterable[str]) -> tuple[list[str],
                     problems.append(f"{file} is a link to {os.readlink(file)}; results are not read through links")
                 elif name in paths or ENTRY.fullmatch(name) or (links and any(p.startswith(f"{name}/") for p in paths)):
                     continue
-                elif root == "raw" or IGNORED.fullmatch(name):
+                elif root == "raw":
                     unrelated.append(file)
-                else:
+                elif not IGNORED.fullmatch(name):
                     problems.append(f"{file} was made by no stage of this study")
     return sorted(problems), sorted(unrelated)
 

@@ -267,7 +267,7 @@ def estimate_mass(
         unit=np.array([robot.joint(joint).unit("{effort}") for joint in joints], object),
         mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
         mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
-        false_mass=false, joint_offset=np.array([offset(row, mass) for row in sides[0]]),
+        false_mass=false, joint_offset=np.array([offset(row, mass) if row.varies else np.nan for row in sides[0]]),
         joint_offset_std=np.array([offset_std(row, MassEstimate(mass, std)) for row in sides[0]]),
         left_rms=left[:, 0], left_rms_std=left[:, 1],
         free_error=np.array([free.sigma[joint] for joint in joints]),

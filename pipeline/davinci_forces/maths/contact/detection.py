@@ -20,8 +20,9 @@ is the root of a small difference.
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
-The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off is added.
-It is taken as the peak minus the mean over `TIP_REACH` on either side.  Mean and impulse are those of the measured
+The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off the tip of a
+triangle is taken as the peak minus the mean over `TIP_REACH` on either side.  A triangle loses all of it and a plateau
+nothing, so half of it is added to the peak, and half to its standard error.  Mean and impulse are those of the measured
 minus the modelled effort, because a smoother spreads a part of a push out of its window.  Student's t widens their
 errors if free motion holds few windows.
 """
@@ -37,6 +38,7 @@ from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.windows import runs
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
+HALF = 0.5  # of what is rounded off a triangle, which a peak loses on average, with an error as large
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
 SHIFT = 0.2  # of the duration of a rise: how much earlier than a ramp a push of a typical shape begins
@@ -157,13 +159,15 @@ def outer_crossing(t: Array, size: Array, k: int, inwards: int, level: float) ->
 class Summary(NamedTuple):
     """One window of contact."""
 
-    peak: float  # the largest sample, with its sign
+    peak: float  # the largest sample, with its sign, and half of what the smoother rounds off
     peak_std: float
     mean: float
     mean_std: float
     impulse: float  # mean times duration
     impulse_std: float
     noise_std: float  # of the peak, without what the smoother rounds off
+    largest: float  # sample
+    t_peak: float  # [s] its time
 
 
 def summarise(
@@ -194,12 +198,13 @@ def summarise(
     mean_std = float(np.hypot(widening * mean_size(direct, free, len(inside)), constant))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))
-    peak_std = float(np.hypot(noise_std, rounded_off(t, tau_ext, k, rise)))
-    return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration, noise_std)
+    rounded, largest = HALF * rounded_off(t, tau_ext, k, rise), float(tau_ext[k])
+    peak = largest + rounded, float(np.hypot(noise_std, rounded))
+    return Summary(*peak, mean, mean_std, mean * duration, mean_std * duration, noise_std, largest, float(t[k]))
 
 
 def rounded_off(t: Array, tau_ext: Array, k: int, rise: float) -> float:
-    """What a smoother that spreads a step over `rise` [s] takes off the peak at sample k of an effort (N,)."""
+    """What a smoother that spreads a step over `rise` [s] takes off a triangle with its peak at sample k of (N,)."""
     return float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
 
 

@@ -165,9 +165,9 @@ def model_errors(rows: Sequence[Rows]) -> float:
 
 
 def offset_std(row: Rows, mass: MassEstimate) -> float:
-    """Standard error of a joint's offset: of the mean effort, and of the mass times the mean load."""
+    """Standard error of a joint's offset, by those of the mean effort and of the mass; NaN if it has none."""
     mean_std = error_of_pooled_mean(row.y - mass.mass * row.x)
-    return float(np.hypot(mean_std, mass.std * float(np.mean(row.x)))) if row.varies else 0.0
+    return float(np.hypot(mean_std, mass.std * float(np.mean(row.x)))) if row.varies else float("nan")
 
 
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:

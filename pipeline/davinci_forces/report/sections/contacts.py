@@ -1,15 +1,12 @@
 """Every contact with its effort and error, against the detection level; and recordings that are not analysed."""
 
-import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Stiffness, Track, Weight
-from davinci_forces.report.content import Block, Cell, Figure, Number, Panel, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
@@ -31,28 +28,29 @@ def section(context: Context) -> Iterator[Block]:
             "motion like that of the logs crosses this level at most once in ten minutes. Onset and release are the "
             "times at which the effort leaves zero and returns to it. Mean and impulse (mean times time) are those of "
             "measured minus modelled effort, which no smoothing moves out of the window. The peak is the largest "
-            "external effort in the window, and at least the mean. Standard errors are the spread over windows of the "
-            "same length in free space; that of an impulse includes those of onset and release if no window is "
-            "stated. That of a peak also includes the smoother's standard deviation there, and the height by which "
-            "smoothing flattens the peak. Peaks are judged by the lower detection level: 99 % of the samples of the "
+            "external effort in the window, and at least the mean. Smoothing flattens it, a plateau not at all, and "
+            "the tip of a triangle most: half of what a tip would lose is added to the peak, and half to its error. "
+            "Standard errors are the spread over windows of the same length in free space; that of an impulse includes "
+            "those of onset and release if no window is stated, and that of a peak the smoother's standard deviation "
+            "there. Peaks are judged by the lower detection level: 99 % of the samples of the "
             f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(context, contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. No.: "
             "number of the window in [@contact-peaks]. "
-            "Interval: 95 % confidence interval of the peak, not below that of the mean. Verdict: whether the peak "
-            "exceeds the detection level; “peak only” if it does but stays below the alarm level; “found” for a "
+            "Mean and impulse: of the stated window, or from onset to release. Verdict: whether the peak exceeds the "
+            "detection level; “peak only” if it does but stays below the alarm level; “found” for a "
             "contact outside the windows that the study states, and “small” if its peak is below twice the alarm "
             "level, so that it may be an error of the model."
         )
-        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Interval", "Mean", "Impulse", "Verdict")
+        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Mean", "Impulse", "Verdict")
         earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
         of_contacts: list[tuple[Cell, ...]] = []
         for contact in contacts:
             of_contacts += rows(context, contact, earlier[contact.joint])
             earlier[contact.joint] += len(contact)
-        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrrl", largest(contacts))
+        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(
@@ -83,20 +81,8 @@ def rows(context: Context, contact: Contact, earlier: int) -> Iterator[tuple[Cel
     for i in range(len(contact)):
         key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
         onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
-        plain = peak if isinstance(peak, str) else replace(peak, std=None)  # as the interval has its error
-        number, limits = str(earlier + i + 1), interval(peak, mean)
-        yield (*run_cells(contact), number, onset, release, plain, limits, mean, impulse, verdict(contact, i))
-
-
-def interval(peak: Number | str, mean: Number | str) -> str:
-    """The 95 % interval of a peak, which is not smaller than that of the mean of the same sign."""
-    if isinstance(peak, str) or peak.std is None or not peak.std > 0:
-        return "–"
-    sign, half = math.copysign(1.0, peak.value), NORMAL_95 * peak.std
-    least, most = abs(peak.value) - half, abs(peak.value) + half
-    if isinstance(mean, Number) and sign * mean.value > 0.0:
-        least = max(least, min(abs(mean.value) - NORMAL_95 * (mean.std or 0.0), most))
-    return " to ".join(Number(end, digits=3).text for end in sorted((sign * least, sign * most)))
+        number = str(earlier + i + 1)
+        yield (*run_cells(contact), number, onset, release, peak, mean, impulse, verdict(contact, i))
 
 
 def verdict(contact: Contact, i: int) -> str:

@@ -201,10 +201,12 @@ def paragraph_for_paper(context: Context) -> str:
     slowest = f"the slowest that shows 90 % of a push of 1 s at most {settings.delay:g} s late"
     walk = f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})"
     scores = "; ".join(filter(None, (unseen_score(context, joint.name) for joint in robot.joints))) or "none"
+    logs_in_words = count(len(logs), "simulated log" if context.study.simulated else "recording")
+    kind = "a simulated arm" if context.study.simulated else "an arm"
     return fill(
-        f"External efforts of an arm ({robot.title}) were estimated from motor efforts and joint positions with "
+        f"External efforts of {kind} ({robot.title}) were estimated from motor efforts and joint positions with "
         f"davinci-forces {context.provenance.version} (code {context.provenance.code}). Parameters were identified "
-        f"from {count(len(logs), 'recording')} ({', '.join(sorted(logs))}) of "
+        f"from {logs_in_words} ({', '.join(sorted(logs))}) of "
         f"{sum(s.duration for s in summaries):.0f} s in all at {rates} Hz{averaged}; the model was "
         f"{'selected by cross-validation over blocks of path' if settings.fit == CHOSEN else settings.fit}. Model, "
         "error (root mean square, beyond noise) on unseen data, and level below which 99 % of free-motion samples "

@@ -8,6 +8,7 @@ from davinci_forces.records import KINDS, LogSummary
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
+from davinci_forces.study import LogEntry
 
 PER_LINE = 4  # settings
 
@@ -36,7 +37,10 @@ def section(context: Context) -> Iterator[Block]:
     yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
     if study.changed:
         yield Prose("Changes of the robot:")
-        yield Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))
+        yield Listing("\n".join(f"{name}: {in_words(value)}" for name, value in study.changed.items()))
+    if turned := [f"{log.name}: {', '.join(names)}" for log in study.logs if (names := reversed_channels(log))]:
+        yield Prose("Quantities whose sign the study reverses (`sign = -1`):")
+        yield Listing("\n".join(turned))
     if provenance.processed:
         name = f"The {len(provenance.processed)} processed files by kind of record; kinds without input data"
         folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
@@ -50,6 +54,16 @@ def section(context: Context) -> Iterator[Block]:
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
     if provenance.study:
         yield OnScreen("The study file", "study-file", (Listing(provenance.study),))
+
+
+def in_words(value: object) -> str:
+    """A value of study.toml, or the keys and values of a table."""
+    return ", ".join(f"{key} = {of!r}" for key, of in value.items()) if isinstance(value, dict) else str(value)
+
+
+def reversed_channels(log: LogEntry) -> list[str]:
+    """The quantities of a log whose sign the study reverses."""
+    return [source.quantity for source in log.channels if source.sign < 0]
 
 
 def channels(summaries: list[LogSummary]) -> Table:

@@ -7,6 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
@@ -110,7 +111,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
         f"that of the robot's chain. In study.toml {TURN}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
-        "unstated": ". The study states no mass, so the scale of the efforts is not known.",
+        "unstated": f". The study states no mass, so none tests the scale of the efforts{scales(context, weight)}.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
         f"{literal(worst_joint(weight))}, and where the mass hung.",
@@ -118,6 +119,14 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
+
+
+def scales(context: Context, weight: Weight) -> str:
+    """The scales that stated masses on the same joints give; "" if there are none."""
+    weights = [of for of in context.catalogue.records(Weight) if math.isfinite(of.stated_mass)]
+    of_same = [of.log for of in weights if [*of.loaded] == [*weight.loaded]]
+    found = [f"{context.number(f'weight.{log}.scale', 3)} by {literal(log)}" for log in of_same]
+    return f": this is {as_list(found)}, whose error is not in that of this mass" if found else ""
 
 
 def worst_joint(weight: Weight) -> str:
@@ -134,7 +143,7 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     """The external effort of each joint and the effort of the mass.  Fig 7.12"""
     mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
     by = "estimated" if math.isnan(weight.stated_mass) else "stated"
-    offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
+    offsets = dict(zip(weight.loaded, np.nan_to_num(weight.joint_offset), strict=True))
     name = literal(weight.log)
     subtracted = ", before the tare is subtracted and the model's error with it" if weight.tare else ""
     once = "over one averaged period" if loads[0].period else "over the run"
@@ -167,7 +176,8 @@ def by_joint(context: Context, weight: Weight) -> Table:
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at its position and "
         "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
         "standard error of the mass includes it, or is 0 where a tare is subtracted, as it cancels."
-        f"{together if len(rows) > 1 else ''} Also the offset of the day, and "
+        f"{together if len(rows) > 1 else ''} Also the offset of the day, or – where a constant effort cannot be told "
+        "from the mass, which it then shifts, and "
         "the root mean squares of the residual with the mass and of the model's error in free motion."
     )
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")

@@ -25,10 +25,13 @@ def read(study: Path, kind: str, selection: dict[str, str]) -> pd.DataFrame:
     folder = f"processed/{KINDS[kind].folder()}/"
     files = [Path(name).relative_to("processed") for name in outputs if name.startswith(folder)]
     records = [store.read(KINDS[kind], study_folders.processed, file) for file in files]
-    records = [r for r in records if all(str(getattr(r, k)) == v for k, v in selection.items())]
+    for key, value in selection.items():
+        known = sorted({str(getattr(record, key)) for record in records})
+        if known and value not in known:
+            raise BadRequest(f"{study} has no {kind} whose {key} is {value!r}; there are {', '.join(known)}")
+        records = [record for record in records if str(getattr(record, key)) == value]
     if not records:
-        condition = f" with {selection}" if selection else ""
-        raise MissingRecord(f"{study} has no {kind} records{condition}; run `davinci-forces all {study}`")
+        raise MissingRecord(f"{study} has no {kind} records; run `davinci-forces all {study}`")
     frame = pd.concat([as_frame(record) for record in records], ignore_index=True)
     for name in KINDS[kind].KEY:
         frame[name] = frame[name].astype("category")

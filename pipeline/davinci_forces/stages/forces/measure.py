@@ -113,7 +113,7 @@ def contacts(
     rows, short = [], []
     for window, event, stated in placed:
         summary = detection.summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
-        if summary is not None and abs(summary.peak) <= NORMAL_95 * summary.noise_std:
+        if summary is not None and abs(summary.largest) <= NORMAL_95 * summary.noise_std:
             event = None
         if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
@@ -122,7 +122,8 @@ def contacts(
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))  # flattened, if short
             above = bool(is_above[~is_outside(track.t, [window])].any())
-            rows.append((stated, event is not None, above, *times, *duration, peak, *summary[1:4], *impulse))
+            times = (*times, *duration, summary.t_peak)
+            rows.append((stated, event is not None, above, *times, peak, *summary[1:4], *impulse))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
@@ -130,8 +131,8 @@ def contacts(
     if not rows:
         return
     names = (
-        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std", "peak",
-        "peak_std", "mean", "mean_std", "impulse", "impulse_std",
+        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std",
+        "t_peak", "peak", "peak_std", "mean", "mean_std", "impulse", "impulse_std",
     )  # fmt: skip
     yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
 

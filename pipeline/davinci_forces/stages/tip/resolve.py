@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.contact.detection import rounded_off, without_rounding
+from davinci_forces.maths.contact.detection import HALF, rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -201,13 +201,14 @@ def tip_contacts(
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
-    C, sigma_std = peak_errors(force, tracks, chain, at)
+    C, sigma_std, lost = peak_errors(force, tracks, chain, at)
+    x, y, z = f_peak = (f[at] + lost).T
     sigma, axes = tip_force.sigma_ellipsoid(C)
     std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
     yield TipContact(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
-        t_peak=force.t[at], f_x=f[at, 0], f_x_std=std[:, 0], f_y=f[at, 1], f_y_std=std[:, 1], f_z=f[at, 2],
-        f_z_std=std[:, 2], f_peak=size[at], f_peak_std=np.sqrt(np.einsum("ni,nij,nj->n", u, C, u)),
+        t_peak=force.t[at], f_x=x, f_x_std=std[:, 0], f_y=y, f_y_std=std[:, 1], f_z=z, f_z_std=std[:, 2],
+        f_peak=np.linalg.norm(f_peak, axis=0), f_peak_std=np.sqrt(np.einsum("ni,nij,nj->n", u, C, u)),
         sigma_1=sigma[:, 0], sigma_1_std=sigma_std[:, 0], sigma_2=sigma[:, 1], sigma_2_std=sigma_std[:, 1],
         sigma_3=sigma[:, 2], sigma_3_std=sigma_std[:, 2], weak_x=axes[:, 0, 0], weak_y=axes[:, 0, 1],
         weak_z=axes[:, 0, 2], x=force.x[at], y=force.y[at], z=force.z[at], condition=force.condition[at],
@@ -215,8 +216,8 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers) -> tuple[Array, Array]:
-    """Covariance (K, 3, 3) of the force at peaks (K,) with what is rounded off, and errors (K, 3) of its half-axes.
+def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers) -> tuple[Array, Array, Array]:
+    """Covariance (K, 3, 3) of the force at peaks (K,), errors (K, 3) of its half-axes, and what is rounded off (K, 3).
 
     They err by each joint's model variance, and what is rounded off is as uncertain as the rest of the force.
     """
@@ -224,17 +225,17 @@ def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Inte
     std = np.stack([without_rounding(t.tau_ext_smooth_std[at], t.tau_ext_rounding[at]) for t in tracks], axis=-1)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
     rounded = np.array([[rounded_off(t.t, t.tau_ext_smooth, k, t.smooth_rise) for t in tracks] for k in at.tolist()])
-    lost, C = tip_force.from_efforts(J, rounded, tip_force.covariance(std, rho))
+    lost, C = tip_force.from_efforts(J, HALF * rounded, tip_force.covariance(std, rho))
     squares, half_axes = np.zeros(std.shape), tip_force.sigma_ellipsoid(C)[0]
     for i, track in enumerate(tracks):
         wider = std.copy()
         wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
-        _, C_wider = tip_force.from_efforts(J, rounded, tip_force.covariance(wider, rho))
+        _, C_wider = tip_force.from_efforts(J, HALF * rounded, tip_force.covariance(wider, rho))
         squares += (tip_force.sigma_ellipsoid(C_wider)[0] - half_axes) ** 2
     C_peak = C + lost[:, :, None] * lost[:, None, :]
     sigma, axes = tip_force.sigma_ellipsoid(C_peak)
     share = np.einsum("nki,ni->nk", axes, lost) / np.maximum(sigma, np.finfo(float).tiny)
-    return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes))
+    return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes)), lost
 
 
 def peak_sample(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:
