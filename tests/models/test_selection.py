@@ -1,6 +1,8 @@
 """Choosing a model: refits without parts of the path against refits from scratch, ridges, and which candidate wins."""
 
+from dataclasses import replace
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Candidate, CandidatePart, Library, share_parameters, weights_of
-from davinci_forces.identification.chosen import reason
+from davinci_forces.identification.chosen import Selection, better, reason
 from davinci_forces.identification.observations import CellEquations, Observed
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
@@ -216,6 +218,54 @@ def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():
     assert choose_candidate([worth(0.01), worth(0.1)], [3, 3], [False, True]) == (1, 1)
     with pytest.raises(ValueError, match="empty"):
         choose_candidate([worth(0.1)], [3], [False])
+
+
+class Named(NamedTuple):
+    """As much of a candidate as a selection needs."""
+
+    name: str
+    rank: int
+    variant: str = "coupled"
+
+    @property
+    def size(self) -> int:
+        return self.rank
+
+
+def selection_of(**scores: tuple[int, float, bool]) -> Selection:
+    """A selection of candidates with their ranks, errors and whether physics allows them."""
+    made = [Named(name, rank) for name, (rank, _, _) in scores.items()]
+    results, physical = [worth(x) for _, x, _ in scores.values()], [x for _, _, x in scores.values()]
+    chosen, best = choose_candidate(results, [c.rank for c in made], physical if any(physical) else [True] * len(made))
+    table = {"score": np.array([x for _, x, _ in scores.values()])}
+    return Selection(tuple(made), tuple(results), tuple(physical), table, made[chosen], made[best], "")
+
+
+def test_where_physics_forbids_the_searched_model_that_is_chosen_the_others_that_it_forbids_compete():
+    searched = selection_of(searched=(9, 0.09, False))
+    both = better(selection_of(alone=(3, 0.2, True), smooth=(7, 0.08, False)), searched)
+    assert (both.chosen.name, both.best.name, both.chosen.variant) == ("smooth", "smooth", CHOSEN)
+    assert "less than any other" in both.why
+    assert both.scores["score"].tolist() == [0.2, 0.08, 0.09]
+    both = better(selection_of(alone=(3, 0.2, True), smooth=(7, 0.1, False)), searched)
+    assert both.chosen.name == "searched"
+
+
+def test_no_model_that_physics_forbids_is_better_than_the_chosen_one_that_it_allows():
+    fixed = selection_of(alone=(3, 0.2, True), smooth=(7, 0.08, False))
+    both = better(fixed, selection_of(searched=(9, 0.09, True)))
+    assert (both.chosen.name, both.best.name) == ("searched", "searched")
+    assert better(fixed, None).chosen.name == "alone"
+    both = better(fixed, selection_of(searched=(9, 0.3, True)))
+    assert both.chosen.name == "alone"
+
+
+def test_the_reason_names_a_better_model_of_the_other_selection():
+    doubtful = selection_of(small=(3, 0.11, True), large=(30, 0.10, True))
+    fixed = replace(doubtful, chosen=doubtful.candidates[0])  # as if it were not clearly worse than the large one
+    both = better(fixed, selection_of(searched=(9, 0.105, True)))
+    assert (both.chosen.name, both.best.name) == ("searched", "large")
+    assert "the best, large, errs by 0.0050 less" in both.why
 
 
 def test_fits_of_different_efforts_make_one_candidate_of_their_mean_error():

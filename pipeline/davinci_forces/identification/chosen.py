@@ -1,7 +1,7 @@
 """The choice among candidate models, and the parameters of the fitted candidates."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from davinci_forces.maths.selection import MAX_GROUPS, CrossValidation, Equation
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.records.prediction import CHOSEN
 
+JOINED = ("candidates", "physical", "results")  # fields of two selections
 LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
 NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
 MIN_INERTIA_SHARE = 1e-3  # of a joint's effort over its paths
@@ -26,6 +27,7 @@ class Selection:
     """Candidates with their scores, the chosen one, the best one, and the reason of the choice."""
 
     candidates: tuple[Candidate, ...]
+    results: tuple[CrossValidation, ...]
     physical: tuple[bool, ...]
     scores: dict[str, Array]  # `score`, `training`, and `over_periods` with periods left out, NaN if no path repeats
     chosen: Candidate
@@ -64,10 +66,11 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     models, results = (list(column) for column in zip(*pairs, strict=True))
     physical = [c.is_physical for c in models]
     eligible = physical if any(physical) else [True] * len(models)
-    chosen, best = selection.choose_candidate(results, [c.rank for c in models], eligible)
+    chosen, best = choose(models, results, eligible)
     repeated = np.array([over_periods(c, count) for c in models])
     return Selection(
         candidates=tuple(models),
+        results=tuple(results),
         physical=tuple(physical),
         scores={
             "score": np.array([result.score for result in results]),
@@ -84,16 +87,35 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
 
 
 def better(fixed: Selection, searched: Selection | None) -> Selection:
-    """Return the selection whose chosen candidate errs less, named `chosen`, with the candidates of both."""
+    """Return the selection whose chosen candidate errs less, named `chosen`, with the candidates of both.
+
+    If physics forbids that one, and it is chosen nevertheless, the others that physics forbids compete with it.
+    """
     both = [fixed, *([searched] if searched else [])]
-    winner = min(both, key=lambda result: result.score_of(result.chosen))
-    return replace(
-        winner,
-        candidates=tuple(c for result in both for c in result.candidates),
-        physical=tuple(x for result in both for x in result.physical),
-        scores={name: np.concatenate([result.scores[name] for result in both]) for name in fixed.scores},
-        chosen=winner.chosen._replace(variant=CHOSEN),
+    candidates, physical, results = ([x for of in both for x in getattr(of, name)] for name in JOINED)
+    place = {c.name: i for i, c in enumerate(candidates)}
+    i = min((place[of.chosen.name] for of in both), key=lambda k: results[k].score)
+    eligible = physical if physical[i] else [True] * len(candidates)
+    if not physical[i]:
+        free = [of.candidates[choose(of.candidates, of.results, [True] * len(of.results))[0]] for of in both]
+        i = min((place[c.name] for c in free), key=lambda k: results[k].score)
+    best = min(np.flatnonzero(eligible).tolist(), key=lambda k: results[k].score)
+    return Selection(
+        candidates=tuple(candidates),
+        results=tuple(results),
+        physical=tuple(physical),
+        scores={name: np.concatenate([of.scores[name] for of in both]) for name in fixed.scores},
+        chosen=candidates[i]._replace(variant=CHOSEN),
+        best=candidates[best],
+        why=reason(candidates, results, [c.size for c in candidates], i, best),
     )
+
+
+def choose(
+    candidates: Sequence[Candidate], results: Sequence[CrossValidation], eligible: Sequence[bool]
+) -> tuple[int, int]:
+    """Indices of the chosen candidate, of the lowest rank that is not clearly worse than the best, and of the best."""
+    return selection.choose_candidate(results, [c.rank for c in candidates], eligible)
 
 
 def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:
@@ -116,7 +138,7 @@ def reason(
         text += ", less than any other"
     else:
         difference, std = results[i].score - results[best].score, standard_error(results[i], results[best])
-        clearly = "it is not clearly better" if difference <= std else "not all models of this kind are clearly worse"
+        clearly = "it is not clearly better" if difference <= std else "not all smaller models are clearly worse"
         text += (
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
             f"{clearly}, and it has {sizes[best]} parameters instead of {sizes[i]}"

@@ -151,8 +151,8 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         first = tuple(literal(text) for _, text in first_of_each_kind(of_stages))
         yield Bullets(first)
         if len(first) < len(of_stages):
-            every = Bullets(tuple(literal(text) for _, text in of_stages))
-            yield OnScreen(f"All {len(of_stages)} remarks", "all-remarks", (every,))
+            all_of_them = Bullets(tuple(literal(text) for _, text in of_stages))
+            yield OnScreen(f"All {len(of_stages)} remarks", "all-remarks", (all_of_them,))
     of_the_tip = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("resolve", "sense")]
     if left_out := tuple(literal(text) for diagnostic in of_the_tip for text in diagnostic.text):
         yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(left_out),))

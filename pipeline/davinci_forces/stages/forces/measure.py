@@ -122,8 +122,8 @@ def contacts(
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))  # flattened, if short
             above = bool(is_above[~is_outside(track.t, [window])].any())
-            times = (*times, *duration, summary.t_peak)
-            rows.append((stated, event is not None, above, *times, peak, *summary[1:4], *impulse))
+            measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *impulse)
+            rows.append((stated, event is not None, above, *measured))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
