@@ -275,11 +275,12 @@ def test_a_contact_is_judged_by_the_threshold_of_its_joint_and_filter():
         Threshold("hand_pitch", "rts", 1.0, 0.1, 9.0, 0.9, "a", 1, 0.95, 0.01, 0.2),
         Threshold("hand_roll", "ekf", 1.0, 0.1, 9.0, 0.9, "b", 1, 0.95, 0.01, 0.2),
     ]
+    push = np.where((T >= 9.0) & (T <= 11.0), 1.0, 0.0)
     assert not measured(track(noise()), theirs, about)
-    [contact] = measured(
-        track(noise()), [*theirs, Threshold("hand_roll", "rts", 0.01, 0.001, 9.0, 0.9, "c", 1, 0.95, 0.01, 0.2)], about
-    )
-    assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, 1)
+    own = Threshold("hand_roll", "rts", 0.01, 0.001, 9.0, 0.9, "c", 1, 0.95, 0.01, 0.2)
+    for effort, above in ((noise() + push, 1), (noise(), 0)):  # the interval of noise holds zero
+        [contact] = measured(track(effort), [*theirs, own], about)
+        assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, above)
 
 
 def test_a_track_knows_when_it_was_not_touched_in_its_own_words():

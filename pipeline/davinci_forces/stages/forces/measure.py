@@ -94,9 +94,9 @@ def contacts(
 ) -> Iterator[Contact | Diagnostic]:
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts, and any outside them.
 
-    A contact is not found if the 95 % interval of its peak holds zero, as where the arm swings after a larger push.
-    What the smoother rounds off does not count in that interval: it makes a peak smaller, never larger.  A peak is at
-    least the mean.
+    A contact is not found, nor above the detection level, if the 95 % interval of its peak holds zero, as where the
+    arm swings after a larger push.  What the smoother rounds off does not count in that interval: it makes a peak
+    smaller, never larger.  A peak is at least the mean.
     """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
@@ -113,15 +113,15 @@ def contacts(
     rows, short = [], []
     for window, event, stated in placed:
         summary = detection.summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
-        if summary is not None and abs(summary.largest) <= NORMAL_95 * summary.noise_std:
-            event = None
+        clear = summary is not None and abs(summary.largest) > NORMAL_95 * summary.noise_std
+        event = event if clear else None
         if summary is not None and (event or (stated and not track.at_rest)):
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))  # flattened, if short
-            above = bool(is_above[~is_outside(track.t, [window])].any())
+            above = clear and bool(is_above[~is_outside(track.t, [window])].any())
             measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *impulse)
             rows.append((stated, event is not None, above, *measured))
             if not stated and release - onset < track.smooth_rise:
