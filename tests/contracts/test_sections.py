@@ -39,6 +39,7 @@ from davinci_forces.report.content import (
     Listing,
     Number,
     OnScreen,
+    Panel,
     Prose,
     Section,
     Table,
@@ -502,7 +503,7 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, found)
     level = "above the alarm level, which free motion crosses at most once in ten minutes"
-    assert f"**{sum(map(len, found))} contacts found {level}; the study states none. Largest: " in said
+    assert f"**{sum(map(len, found))} contacts found {level}; the study states none. Largest" in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
     windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
@@ -553,7 +554,7 @@ def test_the_value_of_a_peak_is_left_out_beside_a_larger_one(lab: Lab, catalogue
     values = {name: np.zeros(3) for name in type(contact).columns()}
     values |= {"found": np.ones(3), "onset": onset, "release": onset + 0.01 * width, "peak": np.array([1.0, -2.0, 0.5])}
     shown = summary.named_peaks(track, replace(contact, **values))
-    assert shown.names == ("", "-2", "+0.5")
+    assert shown.names == ("", "−2", "+0.5")
     np.testing.assert_array_equal(shown.y, [1.0, -2.0, 0.5])  # where the names say
     apart = replace(contact, **values | {"alarm_level": 0.5})
     assert [contacts_section.verdict(apart, row) for row in range(3)] == ["found", "found", "small"]
@@ -648,6 +649,24 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     logs = (replace(full.study.logs[0], channels=(channel,)),)
     told = opening.currents_in_words(replace(full, study=replace(full.study, robot=robot, logs=logs)))
     assert told == " 1 A of a motor counts as 8.76 N m on the hand roll."
+    alike = tuple(replace(joint, name=f"{joint.name}_{i}") for i in (1, 2) for joint in (drive,))
+    channels = tuple(Source(f"{joint.name}.i", "current", "current") for joint in alike)
+    both = replace(full.study, robot=replace(robot, joints=alike), logs=(replace(logs[0], channels=channels),))
+    told = opening.currents_in_words(replace(full, study=both))
+    assert told == " 1 A of a motor counts as 8.76 N m on the hand roll 1 and the hand roll 2."
+
+
+def test_page_one_names_the_log_of_all_panels_and_peaks_once(full: Context):
+    panels = [Panel(f"Joint {i}, push", "time [s]", "effort [N m]", ()) for i in range(4)]
+    assert [panel.title for panel in summary.in_column(panels)] == [f"Joint {i}" for i in range(4)]
+    assert summary.caption(full.catalogue.records(Contact), panels).startswith("External effort of each joint in push")
+    other = [*panels, Panel("Joint 4, tip", "time [s]", "effort [N m]", ())]
+    assert [panel.title for panel in summary.in_column(other)] == [panel.title for panel in other]
+    assert summary.caption(full.catalogue.records(Contact), other).startswith("External effort of each joint. ")
+    tip = [contact for contact in full.catalogue.records(Contact) if contact.log == "tip"]
+    assert summary.largest_peaks(full, tip).count("tip") == 1
+    assert summary.largest_peaks(full, tip).startswith(" Largest in tip: ")
+    assert summary.largest_peaks(full, tip[:1]).startswith(" Largest: ")
 
 
 def test_where_nothing_is_to_be_looked_at_first_the_next_step_is_said(full: Context):

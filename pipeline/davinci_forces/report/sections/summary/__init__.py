@@ -100,15 +100,22 @@ def rule_in_words(trusts: list[Trust]) -> str:
 
 
 def caption(contacts: list[Contact], panels: list[Panel]) -> str:
-    """The caption of the figure."""
+    """The caption of the figure, which names the log if all panels are of one, as `in_column` then does not."""
     level = "Grey band: 95 % of the samples in free space."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
     which *= len({contact.log for contact in contacts}) > 1
+    where = f" in {literal(one_log(panels))}" if one_log(panels) else ""
     is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
-    return f"External effort of each joint{shaded}. {which}{level}"
+    return f"External effort of each joint{where}{shaded}. {which}{level}"
+
+
+def one_log(panels: list[Panel]) -> str:
+    """The log of all of several panels, of which the title of each ends in its log; "" if they differ."""
+    logs = {panel.title.rpartition(", ")[2] for panel in panels}
+    return next(iter(logs)) if len(logs) == 1 < len(panels) else ""
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -155,12 +162,15 @@ def largest_peaks(context: Context, contacts: list[Contact]) -> str:
     for contact in (contact for contact in contacts if contact.above.any()):
         row = int(np.argmax(np.abs(contact.peak) * contact.above))
         joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1, contact.onset[row]))
+    largest = {joint: max(peaks) for joint, peaks in joints.items()}
+    logs = {log for _, log, _, _ in largest.values()}
+    named = f" in {literal(*logs)}" if len(logs) == 1 < len(largest) else ""  # once for all
     peaks = [
-        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} ({literal(log)}, "
-        f"from {onset:.1f} s)"
-        for joint, (_, log, number, onset) in ((joint, max(largest)) for joint, largest in joints.items())
+        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} "
+        f"({'' if named else f'{literal(log)}, '}from {onset:.1f} s)"
+        for joint, (_, log, number, onset) in largest.items()
     ]
-    return f" Largest: {as_list(peaks)}." if peaks else ""
+    return f" Largest{named}: {as_list(peaks)}." if peaks else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -201,9 +211,11 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
 def in_column(panels: list[Panel]) -> Iterator[Panel]:
     """Panels in columns: the first has the legend, the last of each column names the time."""
     lowest = len(panels) - (2 if len(panels) > MAX_IN_COLUMN else 1)
+    named = f", {one_log(panels)}" if one_log(panels) else ""
     for i, panel in enumerate(panels):
         marks = panel.marks if i == 0 else tuple(replace(mark, label="") for mark in panel.marks)
-        yield replace(panel, marks=marks, x_label=panel.x_label if i >= lowest else "")
+        heading, below = panel.title.removesuffix(named), panel.x_label if i >= lowest else ""
+        yield replace(panel, title=heading, marks=marks, x_label=below)
 
 
 def named_peaks(track: Track, contact: Contact) -> Points:
@@ -214,7 +226,9 @@ def named_peaks(track: Track, contact: Contact) -> Points:
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
     t, sizes, width = track.t[places], np.abs(contact.peak[rows]), WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     covered = [(sizes[np.abs(t - at) < width] > size).any() for at, size in zip(t, sizes, strict=True)]
-    names = tuple("" if near else f"{p:+.3g}" for near, p in zip(covered, contact.peak[rows], strict=True))
+    names = tuple(
+        "" if near else f"{p:+.3g}".replace("-", "−") for near, p in zip(covered, contact.peak[rows], strict=True)
+    )
     return Points(t, contact.peak[rows], "", "black", names=names)
 
 

@@ -113,11 +113,12 @@ def logs_in_words(context: Context) -> str:
 
 def currents_in_words(context: Context) -> str:
     """State by which constants motor currents became efforts; "" if none did."""
-    factors = [
-        f"{Number(joint.effort_per_ampere, joint.unit('{effort}'), digits=3)} on {name_in_sentence(joint.name)}"
-        for joint in context.study.joints_by_current
-    ]
-    return f" 1 A of a motor counts as {as_list(factors)}." if factors else ""
+    joints: dict[str, list[str]] = {}
+    for joint in context.study.joints_by_current:
+        factor = str(Number(joint.effort_per_ampere, joint.unit("{effort}"), digits=3))
+        joints.setdefault(factor, []).append(name_in_sentence(joint.name))
+    factors = [f"{factor} on {as_list(names)}" for factor, names in joints.items()]
+    return f" 1 A of a motor counts as {'; '.join(factors)}." if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
