@@ -161,7 +161,7 @@ class LogTable:
 
     def _contact(self) -> str:
         if not self.draft.touching:
-            return "# contact = [[12.0, 14.5]]  # [s] windows of contact; or, without contact, free = [[0.0, 5.0]]"
+            return "# contact = [[12.0, 14.5]]  # [s] of contact; free = [[0.0, 5.0]]: surely without; either or both"
         if reason := _touches_throughout(self.draft):
             return f'contact = "all"  # {reason}'
         return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'

@@ -14,7 +14,7 @@ WORDS = {
     "empty": r"(no|without|zero) ?(weight|pay ?load|load|mass)|(weight|payload|load|mass) (none|off|zero)"
     r"|unloaded|empty|tare|0 ?k?g",
     "free": r"(no|without) ?(contact|touch)|free|in air",
-    "weight": r"weights?|payloads?|load|loaded|\d+ ?k?g",
+    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g",
     "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing",
     "contact": r"contacts?|touch\w*|push\w*|pok\w*|press\w*|collisions?|collid\w*|hits?",
     "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",
@@ -24,6 +24,7 @@ WORDS = {
     "test": r"test|check",
 }
 MASS = re.compile(r"(\d+(?:[.p]\d+)?) ?(k?g)\b")
+GUESSED = "CHECK: guessed from its values: "
 WIDER = 1.2  # times the range of the logs before: a motion that reaches farther identifies, too
 
 
@@ -62,6 +63,13 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     for i in rest:
         if chosen[i].role != "identification" and (reason := _unlike(recordings[i].holding, reference)):
             touched[i] = reason
+    given = [i for i, role in enumerate(roles) if role is not None]
+    for i in rest:  # what values say is a guess where another log of the joint may have that role
+        same = [
+            k for k in (*rest, *given) if k != i and {*recordings[k].holding.moving} & {*recordings[i].holding.moving}
+        ]
+        if same and '"' not in chosen[i].reason:
+            chosen[i] = chosen[i]._replace(reason=f"{GUESSED}{chosen[i].reason}")
     named = [role or (Role("contact", touched[i]) if i in touched else chosen[i]) for i, role in enumerate(roles)]
     return _with_tares(recordings, _with_identification(recordings, named))
 
