@@ -82,7 +82,15 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1.0 / RATE)
     band = {"edges": [0.1, 0.3, 0.6], "factor": [0.9, 1.0, 1.2, 1.4], "model_variance": 0.02}
     Q = [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]]
-    online = {"rate": RATE, "R": [R_q, R_dq], "Q": Q, "initial_std": 0.7, "band": band, "alarm_level": 0.02}
+    online = {
+        "rate": RATE,
+        "R": [R_q, R_dq],
+        "Q": Q,
+        "initial_std": 0.7,
+        "band": band,
+        "alarm_level": 0.02,
+        "lag": 0.05,
+    }
     online["static_friction"] = 0.3
     valid = {"position": [-2.0, 2.0], "velocity": [-9.0, 9.0], "effort": [-50.0, 60.0]}
     joints = []

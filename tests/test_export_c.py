@@ -55,9 +55,23 @@ def test_a_whole_log_gives_the_numbers_of_the_model_and_of_the_filter(model):
         assert_allclose(std_filter, expected[1], rtol=1e-12)
         band, speed = joint.filter["band"], np.searchsorted([0.1, 0.3, 0.6], np.abs(moved.dq[:, i]))
         total = np.array(band["factor"])[speed] * np.sqrt(std_filter**2 + band["model_variance"])
-        assert_allclose(std, np.maximum(std_filter, total), rtol=1e-12)
-        assert (contact == (np.abs(tau_ext) > 0.02)).all()
-        assert contact.any()
+        total, late = np.maximum(std_filter, total), np.empty(N)
+        for part in (slice(0, halves[0]), slice(halves[0], N)):
+            late[part] = smooth(tau_ext[part], 1.0 / (RATE * joint.filter["lag"]))
+        lag = np.maximum(np.abs(tau_ext - late) - total, 0.0)
+        assert_allclose(std, np.hypot(total, lag), rtol=1e-9)
+        assert lag.max() > 2.0 * total.max()  # at the step
+        since = np.where(np.arange(N) < halves[0], np.arange(N), np.arange(N) - halves[0]) + 1
+        assert (contact == np.where(since / RATE > 1.0, np.abs(tau_ext) > 0.02, -1)).all()
+        assert (contact == 1).any()
+
+
+def smooth(x: np.ndarray, share: float) -> np.ndarray:
+    """A first-order low-pass (N,), which takes this share of what is left at each sample."""
+    late = [x[0]]
+    for value in x[1:]:
+        late.append(late[-1] + share * (value - late[-1]))
+    return np.array(late)
 
 
 @pytest.mark.parametrize("structure", ["independent", "coupled"])

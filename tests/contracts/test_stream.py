@@ -202,6 +202,34 @@ def test_contacts_and_standstill_are_told(small):
     assert estimate.status == (OUTSIDE_VALIDITY,) * len(filters)
 
 
+def test_the_band_holds_a_push_that_the_filter_shows_late(small):
+    """Triangles on joints at rest: the errors of the flanks are those of the lag, and much larger than the noise."""
+    stream, n = Stream(small.document()), len(small.joints)
+    rest = [sum(f.valid[0]) / 2.0 for f in stream.filters]
+    t = np.arange(1200) * T_S
+    push = 20.0 * np.clip(1.0 - np.abs((t - 6.0) % 4.0 - 2.0), 0.0, None)
+    for joint in stream.filters:
+        joint.static = 0.0
+    out = [stream.step(*sample) for sample in zip(t, [rest] * len(t), push[:, None] * np.ones(n), strict=True)]
+    steady = slice(400, None)
+    at = np.interp([e.t for e in out[steady]], t, push)
+    rest_of = np.array([e.tau_ext for e in out[steady]]) - out[350].tau_ext - at[:, None]
+    std = np.array([e.std for e in out[steady]])
+    plain = std.min(axis=0)
+    assert (np.abs(rest_of) < 1.96 * plain).mean() < 0.6
+    assert (np.abs(rest_of) < 1.96 * std).mean() > 0.85
+
+
+def test_no_contact_is_told_before_the_filter_has_settled(small):
+    stream, n = Stream(small.document()), len(small.joints)
+    rest = [sum(f.valid[0]) / 2.0 for f in stream.filters]
+    out = [stream.step(k * T_S, rest, np.full(n, 50.0)) for k in range(200)]
+    first = next(k for k, e in enumerate(out) if np.isfinite(e.tau_ext).all())
+    assert {e.status for e in out[: first + round(1.0 / T_S)]} == {(STARTING,) * n}
+    assert all((e.contact == -1).all() for e in out[: first + round(1.0 / T_S)])
+    assert STARTING not in out[first + round(1.0 / T_S) + 1].status
+
+
 def test_the_package_for_ros_is_the_same_core(small, tmp_path):
     """Without ROS, its core is imported beside the model, with numpy alone, and gives the same numbers."""
     files = renderer("ros2")(small).files

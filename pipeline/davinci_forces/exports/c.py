@@ -78,7 +78,7 @@ def _bodies(model: Mapping[str, Any], links: list[Any]) -> list[Any]:
 
 def _filter(online: Mapping[str, Any]) -> list[Any]:
     band, numbers = online["band"] or NO_BAND, [online[name] for name in ("R", "Q", "initial_std")]
-    return [*numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0]
+    return [*numbers, *(band[name] for name in NO_BAND), online["alarm_level"] or 0.0, online["lag"]]
 
 
 def _text(value: Any) -> str:

@@ -11,7 +11,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.files import visible
 from davinci_forces.filters import DEFAULT
 from davinci_forces.filters.error_bands import free_errors
-from davinci_forces.filters.response import noise_model
+from davinci_forces.filters.response import noise_model, ramp_lag
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.constants import GRAVITY
@@ -240,6 +240,6 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
             "initial_std": float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest])),
             "band": next(({"edges": b.edges.tolist(), "factor": b.factor.tolist(), "model_variance": b.model_variance}
                           for b in bands), None),
-            "alarm_level": max(levels, default=None),
+            "alarm_level": max(levels, default=None), "lag": ramp_lag(tuned.inertia, tuned.viscous, 1.0 / rate, noise),
         }  # fmt: skip
     return None

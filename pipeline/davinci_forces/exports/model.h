@@ -30,7 +30,7 @@ typedef double df_real;
 enum { DF_COORDINATES = @N@, DF_STATES = @STATES@ };
 enum { @JOINTS@, DF_JOINTS };
 typedef enum { DF_OK, DF_OUTSIDE_VALIDITY, DF_BAD_INPUT, DF_OTHER_RATE } df_status; /* bad input leaves everything as it was */
-typedef struct { int runs; double t, pace; df_real z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
+typedef struct { int runs; double t, pace; df_real late, z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
 typedef struct { double t; df_real tau, q_measured, dq_measured, q[DF_COORDINATES], dq[DF_COORDINATES], ddq[DF_COORDINATES]; } df_sample;
 typedef struct { df_real tau_hat, tau_ext, std_filter, std; int contact; } df_result; /* contact: -1 where no level is known */
 df_status df_inertia(int joint, const df_real *q, df_real *inertia);

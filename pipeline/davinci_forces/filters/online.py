@@ -29,6 +29,7 @@ ORDER = 3  # of the polynomial through the samples of a window
 GAP = 1.5  # sampling times; a longer wait restarts the filter
 PACE_SAMPLES = 200  # over which the mean sampling time is taken, so that jitter averages out
 MAX_PACE_ERROR = 0.02  # of the sampling time; measured: it moves an estimate by less than its standard deviation
+SETTLED = 1.0  # [s] after which the filter has forgotten how it began
 STILL = 3.0  # standard deviations of the velocity's noise, below which a joint stands still
 DOUBTFUL = 0.67  # likewise, below which the sign of the velocity is that of its noise
 YZX, ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -52,9 +53,10 @@ Z_OF_MOTION: dict[str, Callable[[float, float], float]] = {
 class OnlineEffort:
     """The external efforts on the joints (m,) at time t [s], which is `delay` before the newest sample.
 
-    Numbers are NaN while the first window fills, and where the status of a joint is "bad input" or "other rate".
-    `contact` is 1 above the alarm level, 0 below, and -1 without a level.  `force` (3,) [N] is at the tip, in base
-    axes; NaN where unknown.
+    Numbers are NaN while the first window fills, and where the status of a joint is "bad input" or "other rate".  The
+    status is "starting" for another second, in which the filter forgets how it began.  `std` contains the filter's lag,
+    as far as the change of `tau_ext` shows it.  `contact` is 1 above the alarm level, 0 below, and -1 without a level
+    or while it starts.  `force` (3,) [N] is at the tip, in base axes; NaN where unknown.
     """
 
     t: float
@@ -240,6 +242,7 @@ class OnlineJoint:
         self.T_s, self.initial_std = 1.0 / tuned["rate"], tuned["initial_std"]
         self.band = tuned["band"] or {"edges": [math.inf], "factor": [1.0, 1.0], "model_variance": 0.0}
         self.alarm, self.static = tuned["alarm_level"], tuned["static_friction"]
+        self.follow = min(self.T_s / max(tuned.get("lag", 0.0), self.T_s), 1.0)  # of an effort late by as much again
         own = range(4, 6) if self.coupled else range(6)  # coefficients that the filter computes at its own state
         self.c = tuple(sum(t.value * t.c[i] for t in self.terms) if i in own else 0.0 for i in range(7))
         self.restart()
@@ -247,7 +250,12 @@ class OnlineJoint:
     def restart(self) -> None:
         """Forget the belief and the friction's memory, as after a gap."""
         self.belief: Any = None
-        self.z = [0.0] * len(self.terms)
+        self.z, self.late, self.steps = [0.0] * len(self.terms), 0.0, 0
+
+    @property
+    def settled(self) -> bool:
+        """Whether the filter has run long enough to have forgotten how it began."""
+        return self.steps * self.T_s > SETTLED
 
     def effort(self, q: float, dq: float, ddq: float, of_links: float) -> float:
         """The model's effort at a motion, with the effort of the links."""
@@ -261,7 +269,11 @@ class OnlineJoint:
     def step(
         self, y: tuple[float, float], motion: Sequence[float], tau: float, of_links: float, M: float
     ) -> tuple[float, ...]:
-        """Filter a sample: the model's effort, the external one, and its deviation by the filter and in total."""
+        """Filter a sample: the model's effort, the external one, and its deviation by the filter and in total.
+
+        A ramp is shown late by what it changes in the filter's lag.  That is its distance from the same effort, late
+        by as much again; of it, one standard deviation is due to noise.
+        """
         q, dq, ddq = motion
         M += sum(t.value * t.acceleration for t in self.terms)
         tau_hat = self.effort(q, dq, ddq, of_links)
@@ -284,7 +296,10 @@ class OnlineJoint:
         self.belief = predict(now, q_next, dq_next, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
         speed = sum(abs(dq) > edge for edge in self.band["edges"])
         total = self.band["factor"][speed] * math.sqrt(now[8] + self.band["model_variance"])
-        return tau_hat, now[2], math.sqrt(now[8]), max(math.sqrt(now[8]), total)
+        total = max(math.sqrt(now[8]), total)
+        self.late = now[2] if not self.steps else self.late + self.follow * (now[2] - self.late)
+        self.steps += 1
+        return tau_hat, now[2], math.sqrt(now[8]), math.hypot(total, max(abs(now[2] - self.late) - total, 0.0))
 
 
 def _term(p: Mapping[str, Any]) -> TermValue:
@@ -414,10 +429,10 @@ class Stream:
             tau_hat, tau_ext, _, std = joint.step((float(y[0]), float(y[1])), motion, float(tau[row]), of_links, M)
             static = joint.static if stands else 0.0
             tau_ext -= self.offset[i]
-            level = -1 if joint.alarm is None else int(abs(tau_ext) > joint.alarm + static)
+            level = int(abs(tau_ext) > joint.alarm + static) if joint.settled and joint.alarm is not None else -1
             rows.append((motion[0], motion[1], tau_hat, tau_ext, math.sqrt(std**2 + static**2 / 3.0), level))
             inside = all(low <= x <= high for x, (low, high) in zip(motion[:2], joint.valid, strict=True))
-            status.append(OK if inside else OUTSIDE_VALIDITY)
+            status.append((OK if inside else OUTSIDE_VALIDITY) if joint.settled else STARTING)
         values, contact = np.array([row[:5] for row in rows]).T, np.array([row[5] for row in rows], np.int64)
         force = self._force(values[0], values[3])
         q, dq, tau_hat, tau_ext, std = values
