@@ -51,7 +51,9 @@ class CompiledModel:
         z = int(files["model.h"].partition("DF_STATES = ")[2].partition(" ")[0])
         self.library, number = ctypes.CDLL(str(folder / "model.so")), ctypes.c_float if floats else ctypes.c_double
         self.number = number
-        self.State = structure(runs=ctypes.c_int, t=ctypes.c_double, pace=ctypes.c_double, z=number * z, x=number * 9)
+        self.State = structure(
+            runs=ctypes.c_int, t=ctypes.c_double, pace=ctypes.c_double, late=number, z=number * z, x=number * 9
+        )
         of_joint = {"t": ctypes.c_double} | dict.fromkeys(("tau", "q_measured", "dq_measured"), number)
         self.Sample = structure(**of_joint, **dict.fromkeys(("q", "dq", "ddq"), number * n))
         self.Result = structure(

@@ -20,7 +20,7 @@ typedef struct {
 } Joint;
 enum { LINKS = @LINKS@ };
 enum { BEGINS = 1 }; /* runs: samples since the filter began */
-static const double SETTLED = 1, GAP = 1.5, MEAN = 200, TOLERANCE = 0.02; /* [s], periods in a gap, samples in the pace, and its error */
+static const double TRANSIENT = 1, GAP = 1.5, MEAN = 200, TOLERANCE = 0.02; /* [s], periods in a gap, samples in the pace, and its error */
 static const df_real T = DF_PERIOD;
 static const df_real GRAVITY = @GRAVITY@, UP[3] = @UP@, STILL[DF_COORDINATES] = {0};
 static const Link CHAIN[LINKS] = @CHAIN@;
@@ -172,7 +172,7 @@ df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
     if (!s->runs || other_rate || interval > GAP) {
         const df_state first = {BEGINS, in->t, s->pace, 0, {0}, {y[0], y[1], 0, 1e6 * m->R[0], 0, 0, 1e6 * m->R[1], 0, m->start * m->start}};
         *s = first;
-    } else if (s->runs * T <= SETTLED) s->runs++;
+    } else if (s->runs * T <= TRANSIENT) s->runs++;
     if (other_rate) {
         const df_result unknown = {NAN, NAN, NAN, NAN, -1};
         *out = unknown;
@@ -186,7 +186,7 @@ df_status df_step(int j, df_state *s, const df_sample *in, df_result *out) {
     out->std = fmax(out->std_filter, m->factor[speed] * sqrt(s->x[8] + m->model_variance));
     s->late = s->runs == BEGINS ? out->tau_ext : s->late + fmin(T / fmax(m->lag, T), 1) * (out->tau_ext - s->late);
     out->std = hypot(out->std, fmax(fabs(out->tau_ext - s->late) - out->std, 0)); /* what the lag leaves of a ramp */
-    out->contact = m->alarm > 0 && s->runs * T > SETTLED ? fabs(out->tau_ext) > m->alarm : -1;
+    out->contact = m->alarm > 0 && s->runs * T > TRANSIENT ? fabs(out->tau_ext) > m->alarm : -1;
     known = m->set >= 0 ? out->tau_hat - M * in->ddq[m->row] : 0; /* all that `predict` does not compute */
     FOR(i, m->terms) {
         const Term *p = &m->term[i];

@@ -2,18 +2,21 @@
 @HEAD@
  * df_step takes samples at DF_RATE, @HZ@ Hz.  A single gap restarts the filter.  Samples at another rate, by 2 % on
  * average or gap after gap, give DF_OTHER_RATE with NaN: resample them, or identify from logs at their rate.
- * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them.
+ * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them,
+ * each filtered and delayed by the cutoff and the lag of the joint that is computed.
  * q is the position after a Butterworth low-pass of order 4 that runs forwards and backwards: no delay, half the
  * amplitude at the cutoff, no effect if that is at least 0.4 DF_RATE.  dq is the central difference of q, or the measured
  * velocity after the same low-pass; ddq is the central difference of dq.
  * q_measured is the position without low-pass, dq_measured the measured velocity likewise; if only positions are
  * measured, it is the central difference of the position after the same low-pass at @LOWPASS@ Hz.
- * The effort lags the motion, so q, dq, ddq, q_measured and dq_measured are delayed by the lag before they meet tau.  If
- * a causal low-pass delays q by D, delay q_measured and dq_measured to the same instant, and tau by D minus the lag.
- * The standard deviation leaves out what such a delay costs.  Cutoff and lag:
+ * The effort lags the motion, so q, dq, ddq, q_measured and dq_measured are delayed by the lag before they meet tau; if
+ * the lag is negative, tau is delayed by its size instead.  If a causal low-pass delays q by D, delay q_measured and
+ * dq_measured to the same instant, and tau by D minus the lag.  The standard deviation leaves out what such a delay
+ * costs.  An effort that is there without contact, as the offset of a day, has to be subtracted from tau.  Cutoff, lag:
 @PROCESSING@
  * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
- * one standard error, never more than the motion loses.  Both are limited to the largest effort recorded.
+ * one standard error, never more than the motion loses.  Its memory of a displacement advances in df_step alone.  Both
+ * are limited to the largest effort recorded.  A joint that does not exist is bad input.
  */
 #ifndef DAVINCI_FORCES_MODEL_H
 #define DAVINCI_FORCES_MODEL_H
@@ -32,7 +35,9 @@ enum { @JOINTS@, DF_JOINTS };
 typedef enum { DF_OK, DF_OUTSIDE_VALIDITY, DF_BAD_INPUT, DF_OTHER_RATE } df_status; /* bad input leaves everything as it was */
 typedef struct { int runs; double t, pace; df_real late, z[DF_STATES], x[9]; } df_state; /* of one joint; begin with zeros */
 typedef struct { double t; df_real tau, q_measured, dq_measured, q[DF_COORDINATES], dq[DF_COORDINATES], ddq[DF_COORDINATES]; } df_sample;
-typedef struct { df_real tau_hat, tau_ext, std_filter, std; int contact; } df_result; /* contact: -1 where no level is known */
+/* tau_hat: the model's effort.  tau_ext = tau - tau_hat, filtered: what the arm exerts on its environment.  std: its
+ * deviation, in total, with the filter's lag.  contact: 1 above the alarm level; -1 without one, and for the first second. */
+typedef struct { df_real tau_hat, tau_ext, std_filter, std; int contact; } df_result;
 df_status df_inertia(int joint, const df_real *q, df_real *inertia);
 df_status df_bias(int joint, const df_state *s, const df_real *q, const df_real *dq, df_real *tau);
 df_status df_gravity(int joint, const df_real *q, df_real *tau);

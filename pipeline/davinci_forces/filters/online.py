@@ -29,7 +29,7 @@ ORDER = 3  # of the polynomial through the samples of a window
 GAP = 1.5  # sampling times; a longer wait restarts the filter
 PACE_SAMPLES = 200  # over which the mean sampling time is taken, so that jitter averages out
 MAX_PACE_ERROR = 0.02  # of the sampling time; measured: it moves an estimate by less than its standard deviation
-SETTLED = 1.0  # [s] after which the filter has forgotten how it began
+TRANSIENT = 1.0  # [s] after which the filter has forgotten how it began
 STILL = 3.0  # standard deviations of the velocity's noise, below which a joint stands still
 DOUBTFUL = 0.67  # likewise, below which the sign of the velocity is that of its noise
 YZX, ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -253,9 +253,9 @@ class OnlineJoint:
         self.z, self.late, self.steps = [0.0] * len(self.terms), 0.0, 0
 
     @property
-    def settled(self) -> bool:
+    def has_converged(self) -> bool:
         """Whether the filter has run long enough to have forgotten how it began."""
-        return self.steps * self.T_s > SETTLED
+        return self.steps * self.T_s > TRANSIENT
 
     def effort(self, q: float, dq: float, ddq: float, of_links: float) -> float:
         """The model's effort at a motion, with the effort of the links."""
@@ -429,10 +429,10 @@ class Stream:
             tau_hat, tau_ext, _, std = joint.step((float(y[0]), float(y[1])), motion, float(tau[row]), of_links, M)
             static = joint.static if stands else 0.0
             tau_ext -= self.offset[i]
-            level = int(abs(tau_ext) > joint.alarm + static) if joint.settled and joint.alarm is not None else -1
+            level = int(abs(tau_ext) > joint.alarm + static) if joint.has_converged and joint.alarm is not None else -1
             rows.append((motion[0], motion[1], tau_hat, tau_ext, math.sqrt(std**2 + static**2 / 3.0), level))
             inside = all(low <= x <= high for x, (low, high) in zip(motion[:2], joint.valid, strict=True))
-            status.append((OK if inside else OUTSIDE_VALIDITY) if joint.settled else STARTING)
+            status.append((OK if inside else OUTSIDE_VALIDITY) if joint.has_converged else STARTING)
         values, contact = np.array([row[:5] for row in rows]).T, np.array([row[5] for row in rows], np.int64)
         force = self._force(values[0], values[3])
         q, dq, tau_hat, tau_ext, std = values

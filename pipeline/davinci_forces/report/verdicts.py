@@ -24,7 +24,7 @@ from davinci_forces.report.content import Cell, Level
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
-TURN = "write `sign = -1` with its position, velocity and effort, all three"
+TURN_AROUND = "write `sign = -1` with its position, velocity and effort, all three"
 SAME_MASS = 0.01  # share of a stated mass: torque constants are not known better
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority

@@ -12,7 +12,7 @@ from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
-from davinci_forces.report.verdicts import PRECISE, TURN, percent
+from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
@@ -109,7 +109,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
         "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
-        f"that of the robot's chain. In study.toml {TURN}.",
+        f"that of the robot's chain. In study.toml {TURN_AROUND}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": f". The study states no mass, so none tests the scale of the efforts{scales(context, weight)}.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",

@@ -376,7 +376,7 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
             text = (
                 "its lifted mass is negative. Unless a counterweight lifts it, its positive direction, and with it the "
             )
-            text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN}."
+            text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
         yield FIRST if lifted_mass.name in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
