@@ -426,7 +426,7 @@ def test_page_one_names_a_parameter_of_the_used_model_that_no_mechanism_has(full
     values["theta"][row], values["theta_std"][row] = value, 0.1
     fits = [replace(used, **values) if fit is used else fit for fit in full.catalogue.records(Fit)]
     about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))
-    name = joints.of_joint(used, "hand_roll")[row]
+    name = parts.of_joint(used, "hand_roll")[row]
     told = [text for _, text in summary.looks_at_parameters(about, "hand_roll") if f"negative {name}" in text]
     assert len(told) == is_told
 
@@ -436,7 +436,7 @@ def test_a_negative_lifted_mass_reverses_the_direction_of_its_joint(full: Contex
     assert used is not None
     names, theta = used.parameter.copy(), used.theta.copy()
     row = int(np.flatnonzero(used.positive)[0])
-    suffix = names[row].removeprefix(joints.of_joint(used, "hand_roll")[row])
+    suffix = names[row].removeprefix(parts.of_joint(used, "hand_roll")[row])
     names[row], theta[row] = f"lifted mass{suffix}", -10.0 * used.theta_std[row]
     fits = [replace(used, parameter=names, theta=theta) if fit is used else fit for fit in full.catalogue.records(Fit)]
     about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))

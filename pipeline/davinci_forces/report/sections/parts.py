@@ -10,6 +10,7 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.records import (
     Column,
+    Fit,
     PathShare,
     Prediction,
     Record,
@@ -152,3 +153,10 @@ def of_free_motion(context: Context, predictions: list[Prediction]) -> list[Pred
     """The predictions of free motion in logs that no fit uses; all of them if there is none."""
     free = [p for p in predictions if p.role != "identification" and context.study.log(p.log).has_known_free_motion]
     return free or predictions
+
+
+def of_joint(fit: Fit, joint: str) -> dict[int, str]:
+    """The rows and names of a fit's parameters of this joint alone: not those of links, nor of other joints."""
+    suffix = f" of {joint}" if fit.group != joint else ""
+    own = [i for i, name in enumerate(fit.parameter) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
+    return {i: str(fit.parameter[i]).removesuffix(suffix) for i in own}

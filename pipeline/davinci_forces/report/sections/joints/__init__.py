@@ -16,7 +16,7 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, correlations, estimators
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import is_of_link, of_free_motion, run_name, section_of
+from davinci_forces.report.sections.parts import is_of_link, of_free_motion, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
 
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
@@ -63,13 +63,6 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     yield from unidentified_parameters(context, joint, used is plain)
     yield from implausible([used] if used is not plain else fits, joint)
     yield comparison(context, fits)
-
-
-def of_joint(fit: Fit, joint: str) -> dict[int, str]:
-    """The rows and names of a fit's parameters of this joint alone: not those of links, nor of other joints."""
-    suffix = f" of {joint}" if fit.group != joint else ""
-    own = [i for i, name in enumerate(fit.parameter) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
-    return {i: str(fit.parameter[i]).removesuffix(suffix) for i in own}
 
 
 def equation(joint: str, fit: Fit) -> Equation:

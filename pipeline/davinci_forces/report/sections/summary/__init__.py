@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.maths.models.terms import lifted_mass
 from davinci_forces.records import (
     Contact,
     Diagnostic,
@@ -24,8 +23,7 @@ from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, P
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.joints import of_joint
-from davinci_forces.report.sections.parts import grade_of_mass, scored_predictions, section_of, trust
+from davinci_forces.report.sections.parts import grade_of_mass, of_joint, scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
 from davinci_forces.robots.robot import Kind
@@ -33,6 +31,7 @@ from davinci_forces.robots.robot import Kind
 SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
 # In a warning of any stage that blames units, or leaves a joint without an answer.
 COMES_FIRST = re.compile(r"check the units|its external effort is not estimated")
+LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
@@ -372,12 +371,12 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
         text = f"the model in use has a negative {as_list(wrong)}, which no mechanism has. It predicts the effort as "
         text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
         text += "study.toml, `fit = 'independent.consistent'`."
-        if lifted_mass.name in wrong:
+        if LIFTED_MASS in wrong:
             text = (
                 "its lifted mass is negative. Unless a counterweight lifts it, its positive direction, and with it the "
             )
             text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
-        yield FIRST if lifted_mass.name in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
+        yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
