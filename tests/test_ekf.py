@@ -182,6 +182,13 @@ def test_the_push_of_section_7_3_is_found_as_well_as_any_walk_would_and_smoothed
     assert rmse(tracker("rts"), found) <= 0.5 * rmse(tracker("ekf"), found)
 
 
+def test_without_a_walk_the_search_begins_at_the_effort_of_the_first_recording():
+    recording, _ = thesis_triangle()
+    noise = NoiseModel(r_q=0.01, r_dq=0.008, q_q=0.0, q_dq=1e-4, q_tau=0.0)
+    size = float(np.std(recording.tau)) * recording.T_s
+    assert likeliest_walk([recording], noise) == likeliest_walk([recording], noise._replace(q_tau=size))
+
+
 def test_tuning_finds_the_noise_that_was_put_in():
     """Deviations of position and velocity within a tenth, from three times and a third of them."""
     true = NoiseModel(r_q=2e-4, r_dq=3e-3, q_q=0.0, q_dq=2e-3, q_tau=0.0)

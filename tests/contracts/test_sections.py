@@ -18,6 +18,7 @@ from davinci_forces.records import (
     Excitation,
     Fit,
     FreeSpace,
+    Identifiability,
     LogSummary,
     PeriodResidual,
     Prediction,
@@ -74,6 +75,7 @@ from davinci_forces.report.sections import (
 from davinci_forces.report.sections import (
     weight as weight_section,
 )
+from davinci_forces.report.sections.joints.estimators import correlations
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.verdicts import Trust
@@ -455,6 +457,15 @@ def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Cont
     verdict = weight_section.verdict(full, turned)
     assert verdict.level == "warn"
     assert "the positive direction of the instrument slide is not that of the robot's chain" in verdict.text
+
+
+def test_a_joint_of_one_parameter_has_no_correlation(full: Context):
+    of = full.catalogue.select(Identifiability, group="hand_roll")[0]
+    one = replace(of, **{name: getattr(of, name)[:1] for name in of.columns()})
+    about = replace(full, catalogue=Catalogue(lambda k: [one] if k is Identifiability else full.catalogue.records(k)))
+    [_, figure] = correlations(about, "hand_roll")
+    assert isinstance(figure, Figure)
+    assert figure.alt.endswith("the strongest is 0.00.")
 
 
 def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: Context):

@@ -173,6 +173,24 @@ def test_a_window_gives_a_cubic_and_its_derivatives_exactly(place):
         assert_allclose(computed[interior], exact[interior], rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.parametrize("velocity", ["logged", "derived"])
+def test_the_motion_of_a_stream_is_that_of_a_cubic_by_what_was_measured(catalogue, velocity):
+    motion = catalogue.records(Motion)[0]
+    t = np.arange(300) / 100.0
+    q, dq, ddq = t**3 - 2.0 * t, 3.0 * t**2 - 2.0, 6.0 * t
+    zero = np.zeros(300, int)
+    columns = {
+        name: zero if x.dtype.kind == "i" else t
+        for name in motion.columns()
+        if (x := getattr(motion, name)) is not None
+    }
+    columns |= {"q_measured": q, "dq_measured": dq if velocity == "logged" else 7.0 + 0.0 * t}
+    made = stage._motion(replace(motion, rate=100.0, velocity=velocity, effort_lag=0.0, **columns), 8.0, 0.0)
+    inner = slice(50, -50)
+    for found, true in zip(made[:3], (q, dq, ddq), strict=True):
+        assert_allclose(found[inner, 0], true[inner], atol=1e-6)
+
+
 @pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0, 100_000.0])
 def test_a_window_passes_half_at_the_cutoff(rate):
     half = online.half_width(rate, 17.0)

@@ -139,6 +139,9 @@ def test_control_limits_hold_as_many_values_as_they_say():
         centre, width = control_limits(x, std, 0.9)
         inside.append(np.mean(np.abs(further - centre) <= width))
     assert np.mean(inside) == pytest.approx(0.9, abs=0.01)
+    few = np.array([1.0, 1.1, 1.2, 1.3])  # they scatter less than errors of 2: Student's quantile of three, 3.182
+    centre, width = control_limits(few, np.full(4, 2.0), 0.95)
+    assert_allclose([centre, *width], [1.15, *[3.182446 * 2.0 * 1.25**0.5] * 4], rtol=1e-6)
     equal, x = np.ones(1000), random.normal(size=1000)
     centre, width = control_limits(x, equal, 0.9973)
     assert centre == pytest.approx(x.mean())
