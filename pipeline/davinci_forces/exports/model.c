@@ -114,7 +114,7 @@ df_status df_effort(int j, const df_state *s, const df_real *q, const df_real *d
 df_status df_bias(int j, const df_state *s, const df_real *q, const df_real *dq, df_real *tau) { return df_effort(j, s, q, dq, STILL, tau); }
 
 df_status df_gravity(int j, const df_real *q, df_real *tau) {
-    const df_state still = {0, 0, 0, {0}, {0}};
+    const df_state still = {0, 0, 0, 0, {0}, {0}};
     const df_status status = df_effort(j, &still, q, STILL, STILL, tau);
     if (status != DF_BAD_INPUT) *tau = limited(*tau, MODEL[j].range[2][0], MODEL[j].range[2][1]);
     return status;

@@ -17,7 +17,7 @@ REASONS = {  # why a number has no standard error -> patterns of its key; a stud
     "exact": (  # computed without noise from exact numbers
         "log.*.rate", "log.*.duration", "log.*.jitter", "log.*.longest_gap", "path.*", "fit.*.condition",
         "identifiability.*", "correlation.*", "search.*.excess", "excitation.*", "robot.worst_condition",
-        "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay", "*.stream_delay",
+        "contact.*.t_peak", "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay", "*.stream_delay",
         "stability.*.k_t_cqlf", "stability.*.k_t_switching",
     ),
     "stated": ("guess.*", "robot.link.*", "stability.*.hand_*", "stability.*.link_rate"),
