@@ -17,7 +17,7 @@ REASONS = {  # why a number has no standard error -> patterns of its key; a stud
     "exact": (  # computed without noise from exact numbers
         "log.*.rate", "log.*.duration", "log.*.jitter", "log.*.longest_gap", "path.*", "fit.*.condition",
         "identifiability.*", "correlation.*", "search.*.excess", "excitation.*", "robot.worst_condition",
-        "contact.*.t_peak", "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay", "*.stream_delay",
+        "tip.*.condition", "tip.*.near_singular", "sensor.*.range", "*.push_share", "*.push_delay", "*.stream_delay",
         "stability.*.k_t_cqlf", "stability.*.k_t_switching",
     ),
     "stated": ("guess.*", "robot.link.*", "stability.*.hand_*", "stability.*.link_rate"),
@@ -31,7 +31,7 @@ REASONS = {  # why a number has no standard error -> patterns of its key; a stud
     "setting": (  # chosen for all further computations
         "choice.*.cutoff", "choice.*.effort_lag", "choice.*.ridge", "choice.*.term.*", "tuning.*", "ekf.*.r_q",
         "ekf.*.r_dq", "ekf.*.q_dq", "ekf.*.q_tau", "haptics.tissue_stiffness", "haptics.at_frequency",
-        "tip.*.onset", "tip.*.release",
+        "contact.*.t_peak", "tip.*.onset", "tip.*.release",
     ),
     "standard deviation": (  # itself one of another number, or a factor of one
         "fit.*.std_noise", "fit.*.std_model", "fit.*.std_classical", "*.filter_part", "*.lag_part", "*.smooth_part",
