@@ -2,6 +2,7 @@
 
 import doctest
 import gc
+import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, JointModel, Record, Track, store
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.runner import runs
+from davinci_forces.study import reading
 from tests import arm
 
 SHORT = {"periods": 6, "rate": 50.0}
@@ -104,6 +106,45 @@ def test_the_band_of_a_predicted_effort_holds_the_true_one_of_a_path_that_was_no
     error = np.abs(predicted["tau"] - truth)
     assert np.mean(error < 1.96 * predicted["std"]) > 0.95
     assert predicted["std"].max() < 0.5 * arm.NOISE[JOINT]  # so wide that the test says nothing
+
+
+def test_a_saved_study_gives_the_numbers_of_the_arrays_and_a_stream(identified, tmp_path):
+    folder = identified.save(tmp_path / "raw" / "saved")
+    assert davinci_forces.run(folder, "calibrate", quiet=True)
+    for fit in of_study(folder, Fit):
+        if fit.key in {made.key for made in identified.record}:
+            assert_allclose(
+                fit.theta, next(made.theta for made in identified.record if made.key == fit.key), rtol=1e-12
+            )
+    stream = davinci_forces.stream(folder)
+    assert stream.joints == (JOINT,)
+    with pytest.raises(BadRequest, match="exists; name a new folder"):
+        identified.save(folder)
+
+
+def test_settings_are_saved_and_a_robot_of_no_file_is_not(identified, folder, tmp_path):
+    given = {"effort": {JOINT: 0.5}, "lowpass": 11.0}
+    arguments = {"dq": FIRST.dq, "joints": JOINT, "period": 2.0, "settings": given}
+    robot = str(folder / "arm.toml")
+    made = davinci_forces.identify(robot, FIRST.t, FIRST.q, FIRST.tau, **arguments)
+    study = reading.read(made.save(tmp_path / "set"))
+    assert (study.settings.effort, study.settings.lowpass) == ({JOINT: 0.5}, 11.0)
+    loaded = davinci_forces.robot("arm.toml", folder)
+    made = davinci_forces.identify(loaded, FIRST.t, FIRST.q, FIRST.tau, **arguments)
+    with pytest.raises(BadRequest, match="the name of a listed robot, or a file"):
+        made.save(tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+    with pytest.raises(BadRequest, match="cannot be pickled; use `save`"):
+        pickle.dumps(identified)
+
+
+def test_a_constant_offset_is_subtracted_where_free_windows_are_given(identified):
+    about = (PUSHED.t, PUSHED.q, PUSHED.tau + 0.7, PUSHED.dq)
+    plain, centred = (identified.external_effort(*about, free=free) for free in ((), [(0.0, 3.5), (8.0, 14.0)]))
+    assert float(plain.tau_ext[JOINT].median()) == pytest.approx(0.7, abs=0.1)
+    assert float(centred.tau_ext[JOINT].median()) == pytest.approx(0.0, abs=0.1)
+    stated = identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, PUSHED.dq, contact=[(3.0, 7.0)])
+    assert len(stated.contacts) == 1
 
 
 def test_an_external_effort_leaves_the_models_and_the_predictions_as_they_are(identified):

@@ -32,7 +32,8 @@ def identify(
     `robot` is a name, a .toml or .urdf file, or a Robot.  `t` (n,) is in s.  `q`, `tau` and, where measured, `dq` are
     (n,) or (n, joints) in SI, arrays or pandas objects.  Lists of arrays are several logs.  `joints` names the columns;
     without it, the names of a DataFrame do, or the columns are all joints of the robot.  `period` [s] is that of the
-    excitation, one for all logs or one a log; without it, it is detected.  `settings` are those of a study.
+    excitation, one for all logs or one a log; without it, it is detected.  `settings` are those of a study.  `tau` are
+    efforts at the joints [N m or N]: multiply a motor current by gear ratio and torque constant first.
 
     >>> arm = davinci_forces.identify("davinci", t, q, tau, joints="hand_roll")
     >>> arm.parameters["parameter"].tolist()[:2]

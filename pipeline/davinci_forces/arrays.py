@@ -1,5 +1,6 @@
 """Identify a robot, and estimate its external efforts, from arrays: the stages run on a study in a temporary folder."""
 
+import json
 import shutil
 import tempfile
 import warnings
@@ -36,6 +37,7 @@ FITTED = "identification"
 MIN_SAMPLES = 50  # of a log
 
 Samples = Any  # an array, Series or DataFrame, or a list of those, one a log
+Windows = Sequence[Sequence[float]]  # [[start, end], ...] [s]
 Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.q`, ...
 
 
@@ -64,7 +66,9 @@ def identify(
     ]
     if problems:
         raise BadRequest("\n".join(problems))
-    return IdentifiedArm(arm, used, moved, columns, periods)
+    identified = IdentifiedArm(arm, used, moved, columns, periods)
+    identified.given = robot, dict(settings or {})
+    return identified
 
 
 def refuse(table: TomlTable) -> None:
@@ -117,8 +121,12 @@ def columns_of(
 class IdentifiedArm:
     """The identified models of a robot's joints, which predict efforts and estimate external efforts.
 
-    `record` holds the Fit of each joint, `parameters` the same as a DataFrame, `diagnostics` the remarks of the stages.
+    `fits` and `record` hold the Fit of each joint (with `r2`, `mse`, `logs`), `parameters` the same as a DataFrame,
+    `models` the JointModel of each joint and log, `diagnostics` the remarks of the stages.  `save` makes a study of it,
+    for a report, a stream or an export.
     """
+
+    given: tuple[Any, dict[str, Any]]  # robot and settings as `identify` got them
 
     def __init__(
         self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
@@ -173,20 +181,59 @@ class IdentifiedArm:
         predictions = {model.joint: self._prediction(model) for model in models}
         return pd.concat(list(predictions.values()), keys=list(predictions), axis=1, names=["joint", ""])
 
-    def external_effort(self, t: Samples, q: Samples, tau: Samples, dq: Samples = None) -> "ExternalEffort":
+    def external_effort(
+        self, t: Samples, q: Samples, tau: Samples, dq: Samples = None, *, free: Windows = (), contact: Windows = ()
+    ) -> "ExternalEffort":
         """Estimate the effort that the robot exerts on its environment, and detect contacts.
+
+        It is `tau` minus the effort of the model, smoothed.  Windows [[start, end], ...] [s], from the first sample,
+        are those in which nothing touches the arm (`free`: a constant offset is then subtracted) or something does.
 
         Raises
         ------
         BadRequest
             If the arrays are wrong, or no joint has a model.
         """
-        reading = self._run_on(t, {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq}), MEASURED)
+        windows = {name: [[*window] for window in of] for name, of in (("free", free), ("contact", contact)) if len(of)}
+        reading = self._run_on(t, {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq}), MEASURED, windows)
         tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
         texts = new_texts(reading)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
         return ExternalEffort(tuple(tracks), tuple(contacts), tuple(self._effort_label(t.joint) for t in tracks), texts)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` makes its report.
+
+        Raises
+        ------
+        BadRequest
+            If the folder exists, or the robot was given as an object, of which there is no file.
+        """
+        target, (robot, settings) = Path(folder), self.given
+        if isinstance(robot, Robot):
+            raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
+        if target.exists():
+            raise BadRequest(f"{target} exists; name a new folder")
+        lines = ['title = "From arrays"', f"robot = {in_toml(Path(robot).name)}", "simulated = false"]
+        lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
+        for log in self._study.logs:
+            lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(*log.files)}"]
+            lines += [
+                f"role = {in_toml(log.role)}",
+                *([f"period = {log.period}"] if log.period else []),
+                "[log.channels]",
+            ]
+            lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
+        target.mkdir(parents=True)
+        files = [self._study.folder / file for log in self._study.logs for file in log.files]
+        for file in (*files, *([Path(robot)] if Path(robot).suffix else [])):
+            shutil.copy(file, target)
+        (target / "study.toml").write_text("\n".join(lines) + "\n", "utf-8")
+        return target
+
+    def __getstate__(self) -> dict[str, Any]:
+        raise BadRequest("an IdentifiedArm keeps its logs in a temporary folder and cannot be pickled; use `save`")
 
     def plot(self) -> Any:
         """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
@@ -222,21 +269,26 @@ class IdentifiedArm:
             std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False)[0])
         return pd.DataFrame({"tau": model.tau_hat, "std": std}, index=pd.Index(model.t, name="t"))
 
-    def _saved(self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED) -> LogEntry:
+    def _saved(
+        self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED, **windows: Any
+    ) -> LogEntry:
         """Save a log, and describe it as study.toml does."""
         np.savez(folder / f"{name}.npz", **columns)  # type: ignore[arg-type]
         log = {"name": name, "file": f"{name}.npz", "role": role, "channels": {column: column for column in columns}}
+        log |= windows
         table = TomlTable({"log": [log | ({} if period is None else {"period": period})]}, TomlFile(name, {}))
         [entry] = entries_of(table, self.robot)
         refuse(table)
         return entry
 
-    def _run_on(self, t: Samples, values: dict[str, Samples], stage: str) -> Any:
+    def _run_on(
+        self, t: Samples, values: dict[str, Samples], stage: str, windows: Mapping[str, Any] | None = None
+    ) -> Any:
         problems: list[str] = []
         columns = columns_of(t, values, self.joints, "", problems)
         if problems:
             raise BadRequest("\n".join(problems))
-        return self._run(stage, self._saved(self._study.folder, NEW, columns, None, "contact"))
+        return self._run(stage, self._saved(self._study.folder, NEW, columns, None, "contact", **(windows or {})))
 
     def _run(self, stage: str, *more: LogEntry) -> Any:
         """Run the stages up to this one, without output; return what reads the records of a kind."""
@@ -301,6 +353,13 @@ class ExternalEffort:
 
     def _repr_html_(self) -> str:
         return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)
+
+
+def in_toml(value: Any) -> str:
+    """A text, number, truth value, list or table of them as TOML."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{in_toml(str(key))} = {in_toml(of)}' for key, of in value.items())} }}"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def by_joint(columns: Mapping[str, tuple[Array, Array]]) -> pd.DataFrame:

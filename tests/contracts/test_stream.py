@@ -147,6 +147,15 @@ def test_bad_samples_leave_everything_as_it_was(small):
         stream.step(3.0, np.zeros(n + 1), np.zeros(n))
 
 
+def test_velocities_are_given_always_or_never(small):
+    stream, zero = Stream(small.document()), np.zeros(len(small.joints))
+    stream.step(0.0, zero, zero, zero)
+    with pytest.raises(ValueError, match="give dq in every step or in none"):
+        stream.step(T_S, zero, zero)
+    stream.restart()
+    stream.step(2 * T_S, zero, zero)
+
+
 def test_a_gap_starts_anew(small):
     stream, other = Stream(small.document()), Stream(small.document())
     n = len(stream.coordinates)

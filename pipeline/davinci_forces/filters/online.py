@@ -373,6 +373,8 @@ class Stream:
         sample = [np.array(x, float).ravel() for x in (q, tau, dq) if x is not None]
         if any(len(x) != len(self.coordinates) for x in sample):
             raise ValueError(f"q, tau and dq have one number for each of {', '.join(self.coordinates)}")
+        if self._samples and len(sample) != len(self._samples[-1]):
+            raise ValueError("give dq in every step or in none; `restart` begins anew")
         used = [sample[0], sample[1][[joint.row for joint in self.filters]], *sample[2:]]
         if not (math.isfinite(t) and t > self._t and all(np.isfinite(x).all() for x in used)):
             return self._unknown(t, BAD_INPUT)
