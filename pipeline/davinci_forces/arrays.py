@@ -121,9 +121,9 @@ def columns_of(
 class IdentifiedArm:
     """The identified models of a robot's joints, which predict efforts and estimate external efforts.
 
-    `fits` and `record` hold the Fit of each joint (with `r2`, `mse`, `logs`), `parameters` the same as a DataFrame,
-    `models` the JointModel of each joint and log, `diagnostics` the remarks of the stages.  `save` makes a study of it,
-    for a report, a stream or an export.
+    `fits` and `record` hold the Fit of each joint, with `r2` and `mse`; `parameters` is the same as a DataFrame.
+    `models` has the JointModel of each joint and log, `diagnostics` the remarks of the stages.  `save` makes a study of
+    it, for a report, a stream or an export.
     """
 
     given: tuple[Any, dict[str, Any]]  # robot and settings as `identify` got them

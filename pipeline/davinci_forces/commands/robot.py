@@ -176,7 +176,7 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     """The document as text, in base axes and SI units, rounding errors as 0."""
     from davinci_forces.maths.mechanics.tip_force import ARM
 
-    lines = [robot.title, "", *_joint_lines(robot)]
+    lines = [robot.title, "", *_joint_lines(robot, document.get("jacobian_v", []))]
     if "frames" not in document:
         return "\n".join([*lines, "", "its geometry is not known; add [[link]] to its file, or use a URDF"])
     lines += ["", f"at q = {_numbers(q)}"]
@@ -198,12 +198,18 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
 
 
-def _joint_lines(robot: "Robot") -> Iterator[str]:
-    """One line per joint: its range, speed, and the terms of its effort."""
+def _joint_lines(robot: "Robot", J_v: list[list[float]]) -> Iterator[str]:
+    """One line per joint: its range, speed, the terms of its effort, and where a positive motion moves the tip."""
     width = max(len(joint.name) for joint in robot.joints)
-    for joint in robot.joints:
+    for i, joint in enumerate(robot.joints):
         terms = " + ".join(term.name for term in joint.terms)
-        yield f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}"
+        column = [row[i] for row in J_v if i < len(row)]
+        size = math.hypot(*column)
+        towards = ", ".join(
+            f"{x / size if abs(x) > 0.005 * size else 0.0:.2g}" for x in column if size > PRINTED_AS_ZERO
+        )
+        where = f"; positive: the tip moves along ({towards})" if towards else ""
+        yield f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}{where}"
 
 
 def _moves(joint: "Joint") -> str:

@@ -5,6 +5,10 @@ import inspect
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from textwrap import dedent
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from davinci_forces.maths.models.terms import Term
 
 
 def fields() -> str:
@@ -32,22 +36,33 @@ def python() -> str:
     """Every public name of the package, with its signature and docstring."""
     import davinci_forces
     from davinci_forces import arrays
-    from davinci_forces.filters.online import Stream
+    from davinci_forces.filters.online import OnlineEffort, Stream
     from davinci_forces.robots.robot import Robot
 
     blocks: list[str] = []
     for name in davinci_forces.__all__:
         blocks += document_function(f"davinci_forces.{name}", getattr(davinci_forces, name))
-    for kind in (arrays.IdentifiedArm, Stream, Robot):
-        blocks += [f"## {kind.__name__}", first_sentence(inspect.getdoc(kind))]
-        for name, member in vars(kind).items():
-            if not name.startswith("_") and inspect.isfunction(member) and inspect.getdoc(member):
+    for kind in (arrays.IdentifiedArm, arrays.ExternalEffort, Stream, OnlineEffort, Robot):
+        blocks += [f"## {kind.__name__}", inspect.getdoc(kind) or ""]
+        public = {
+            name: member for name, member in vars(kind).items() if not name.startswith("_") and inspect.getdoc(member)
+        }
+        values = {name: member for name, member in public.items() if isinstance(member, property)}
+        blocks += (
+            ["\n".join(f"- `{name}`: {first_sentence(inspect.getdoc(of))}" for name, of in values.items())]
+            if values
+            else []
+        )
+        for name, member in public.items():
+            if inspect.isfunction(member):
                 blocks += document_function(f"{kind.__name__}.{name}", member, level=3)
     return "\n\n".join(blocks)
 
 
 def robots() -> str:
     """Every shipped robot with its joints, their limits and the terms of their models."""
+    from davinci_forces.maths.constants import GRAVITY
+    from davinci_forces.maths.models.terms import TERMS
     from davinci_forces.robots import ROBOTS, load
 
     blocks = []
@@ -60,7 +75,15 @@ def robots() -> str:
         ]  # fmt: skip
         title = f"{robot.title}: {len(robot.joints)} joints."
         blocks += [f"## {name}", title, table(("joint", "kind", "limits [rad or m]", "terms of its own model"), rows)]
-    return "\n\n".join(blocks)
+    about = f"Its effort is the parameter times the factor; g = {GRAVITY:g} m/s^2. Lifted mass: positive is downwards."
+    own = [(f"`{name}`", factor(term)) for name, term in TERMS.items()]
+    return "\n\n".join([*blocks, "## terms of a joint", about, table(("term", "factor"), own)])
+
+
+def factor(term: "Term") -> str:
+    """What a term multiplies its parameter by, in words of code."""
+    parts = ["ddq"] * bool(term.a) + [name if c == 1.0 else f"{'-' * (c < 0)}g {name}" for name, c in term.b.items()]
+    return " + ".join(parts).replace("+ -", "- ").replace("g 1", "g")
 
 
 PAGES = {  # topic -> title, summary and body
