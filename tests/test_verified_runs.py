@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,24 @@ def test_verify_names_a_file_in_which_one_byte_was_altered(finished, where, seed
     flip(target, int(rng.integers(target.stat().st_size)))
     said = " ".join(call("verify", finished, code=1).split())
     assert target.name in said
+
+
+def test_a_number_is_traced_to_the_raw_files_on_which_it_rests(finished):  # noqa: F811
+    key = "contact.push.hand_roll.1.peak"
+    [number] = [of for of in json.loads((reports(finished) / "results.json").read_text()) if of["key"] == key]
+    first, record, *steps = call("verify", finished, "--number", key).splitlines()
+    assert first.startswith(f"{key} = {number['value']:.6g} ± ")
+    file = processed(finished) / "contact/push/hand_roll.parquet"
+    assert str(file) in record
+    assert sha256(file.read_bytes()).hexdigest()[:16] in record
+    stages = [step.split()[1].rstrip(":") for step in steps if step.startswith("  by ")]
+    assert stages[0] == "measure"
+    assert stages.index("ekf") < stages.index("ingest")
+    raw = {step.split()[1]: step.split()[-1].rstrip(")") for step in steps if step.startswith("  from ")}
+    assert {Path(name).name for name in raw} >= {"push.csv", "roll.csv"}
+    assert all(sha256(Path(name).read_bytes()).hexdigest().startswith(sha) for name, sha in raw.items())
+    said = call("verify", finished, "--number", "contact.push.hand_rol.1.peak", code=1)
+    assert f"did you mean {key}" in " ".join(said.split())
 
 
 def test_verify_names_a_number_that_was_altered(finished):  # noqa: F811

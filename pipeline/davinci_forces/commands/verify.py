@@ -21,12 +21,19 @@ def run(
         bool, Option("--again", help="Recompute everything from raw/ in a temporary folder, and compare.")
     ] = False,
     jobs: Annotated[int, Option(min=1, help="Number of processes to recompute in.")] = 1,
+    number: Annotated[
+        str, Option("--number", metavar="KEY", help="Trace this number of results.json to its raw files, instead.")
+    ] = "",
 ) -> None:
     """Verify a study; every difference is an error, with exit code 1."""
     from davinci_forces.runner import runs, verification
+    from davinci_forces.runner.results.tracing import trace
     from davinci_forces.study import reading
 
     folders = runs.folders(study, processed, reports)
+    if number:
+        echo("\n".join(trace(folders, number)))
+        return
     pages = not again or verification.has_same_environment(folders)
     verified = verification.verify(reading.read(study), folders, "".join(report_id.split()).lower(), pages)
     echo(

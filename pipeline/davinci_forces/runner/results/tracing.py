@@ -1,0 +1,48 @@
+"""The way from a number of the report back to the raw files on which it rests."""
+
+import json
+from collections.abc import Iterator
+from difflib import get_close_matches
+
+from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.files import read_bytes
+from davinci_forces.runner.ledger import Folders, Ledger
+
+MAX_TASKS = 3  # of a stage in one line
+DIGITS = 16  # of a hash, as the report prints them
+
+
+def trace(folders: Folders, key: str) -> Iterator[str]:
+    """The lines that lead from a key of results.json to its record, the tasks behind it, and the raw files.
+
+    Raises BadRequest if there is no such number; MissingRecord if the study has no report.
+    """
+    try:
+        numbers = {number["key"]: number for number in json.loads(read_bytes(folders.reports / "results.json"))}
+    except FileNotFoundError:
+        raise MissingRecord(f"{folders.raw} has no report; run `davinci-forces all {folders.raw}`") from None
+    if key not in numbers:
+        near = " or ".join(get_close_matches(key, numbers, 3)) or "see results.json"
+        raise BadRequest(f"the report of {folders.raw} has no number {key}; did you mean {near}?")
+    number = numbers[key]
+    file, _, place = number["source"].partition("#")
+    error = "" if number["std"] is None else f" ± {number['std']:.2g}"
+    yield f"{key} = {number['value']:.6g}{error} {number['unit']}"
+    yield f"  it is {place} in {folders.file(file)} (SHA-256 {number['sha256'][:DIGITS]})"
+    made = {name: entry for entry in Ledger(folders).entries() for name in entry.outputs}
+    stages: dict[str, dict[str, None]] = {}
+    raw: dict[str, str] = {}
+    waiting, seen = [file], {file}
+    while waiting:
+        if (entry := made.get(waiting.pop(0))) is None:
+            continue
+        stages.setdefault(entry.stage, {})[entry.task] = None
+        for name, sha in entry.fingerprint["inputs"].items():
+            raw |= {name: sha} if name.startswith("raw/") else {}
+            waiting += [name] if name not in seen else []
+            seen.add(name)
+    for stage, tasks in stages.items():
+        more = f" and {len(tasks) - MAX_TASKS} more" if len(tasks) > MAX_TASKS else ""
+        yield f"  by {stage}: {', '.join([*tasks][:MAX_TASKS])}{more}"
+    for name, sha in sorted(raw.items()):
+        yield f"  from {folders.file(name)} (SHA-256 {sha[:DIGITS]})"
