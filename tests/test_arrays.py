@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 
 import davinci_forces
 from davinci_forces.arrays import IdentifiedArm
-from davinci_forces.errors import BadRequest, BadRobot
+from davinci_forces.errors import BadRequest, BadRobot, NotAFile
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, JointModel, Record, Track, store
 from davinci_forces.robots.robot import UNLIMITED
@@ -118,7 +118,7 @@ def test_a_saved_study_gives_the_numbers_of_the_arrays_and_a_stream(identified, 
             )
     stream = davinci_forces.stream(folder)
     assert stream.joints == (JOINT,)
-    with pytest.raises(BadRequest, match="exists; name a new folder"):
+    with pytest.raises(NotAFile, match="exists"):
         identified.save(folder)
 
 

@@ -16,6 +16,7 @@ import pandas as pd
 
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
+from davinci_forces.files import read_bytes, write_folder
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.arrays import Array
@@ -207,14 +208,14 @@ class IdentifiedArm:
 
         Raises
         ------
+        NotAFile
+            If the folder exists.
         BadRequest
-            If the folder exists, or the robot was given as an object, of which there is no file.
+            If the robot was given as an object, of which there is no file.
         """
         target, (robot, settings) = Path(folder), self.given
         if isinstance(robot, Robot):
             raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
-        if target.exists():
-            raise BadRequest(f"{target} exists; name a new folder")
         lines = ['title = "From arrays"', f"robot = {in_toml(Path(robot).name)}", "simulated = false"]
         lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
         for log in self._study.logs:
@@ -225,11 +226,10 @@ class IdentifiedArm:
                 "[log.channels]",
             ]
             lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
-        target.mkdir(parents=True)
         files = [self._study.folder / file for log in self._study.logs for file in log.files]
-        for file in (*files, *([Path(robot)] if Path(robot).suffix else [])):
-            shutil.copy(file, target)
-        (target / "study.toml").write_text("\n".join(lines) + "\n", "utf-8")
+        files += [Path(robot)] if Path(robot).suffix else []
+        contents = {file.name: read_bytes(file) for file in files}
+        write_folder(target, contents | {"study.toml": ("\n".join(lines) + "\n").encode()})
         return target
 
     def __getstate__(self) -> dict[str, Any]:
