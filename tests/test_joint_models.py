@@ -211,7 +211,7 @@ def test_joints_recorded_one_at_a_time_are_named_with_the_remedy_where_they_coup
     warnings = list(choose.never_together(logs, davinci.ROBOT))
     assert [str(w.text[0]) for w in warnings] == [
         "arm: no identification log moves hand_roll and hand_pitch together, so the effort that each needs for the "
-        "motion of the others is not identified; record an excitation of all joints together: "
+        "motion of the others is not identified; where they move together, record an excitation of all: "
         "`davinci-forces excite davinci all`"
     ] * (not together)
     assert not list(choose.never_together(logs, arm.ARM))  # which has no chain

@@ -659,10 +659,15 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     channel = Source(f"{joint.name}.i", "current", "current")
     logs = (replace(full.study.logs[0], channels=(channel,)),)
     told = opening.currents_in_words(replace(full, study=replace(full.study, robot=robot, logs=logs)))
-    assert told == " 1 A of a motor counts as 8.76 N m on the hand roll."
+    assert (
+        told == " 1 A of a motor counts as 8.76 N m on the hand roll (by the robot’s description: check your drives)."
+    )
     alike = tuple(replace(joint, name=f"{joint.name}_{i}") for i in (1, 2) for joint in (drive,))
     channels = tuple(Source(f"{joint.name}.i", "current", "current") for joint in alike)
-    both = replace(full.study, robot=replace(robot, joints=alike), logs=(replace(logs[0], channels=channels),))
+    overridden = {joint.name: {"torque_constant": 0.0438} for joint in alike}
+    both = replace(
+        full.study, changed=overridden, robot=replace(robot, joints=alike), logs=(replace(logs[0], channels=channels),)
+    )
     told = opening.currents_in_words(replace(full, study=both))
     assert told == " 1 A of a motor counts as 8.76 N m on the hand roll 1 and the hand roll 2."
 

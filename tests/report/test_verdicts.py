@@ -105,7 +105,7 @@ def test_a_path_is_new_to_the_report_where_it_is_new_to_the_stages():
 
 
 def path_share(log, path_new=1.0, moving=1.0):
-    return PathShare(log, "roll", "identification", path_new, moving, 1.0)
+    return PathShare(log, "roll", "identification", path_new, moving, 1.0, 0.0)
 
 
 def by_blocks(log="one", error=0.05):
@@ -216,6 +216,17 @@ def test_of_motions_faster_than_all_fitted_ones_the_fastest_is_to_be_looked_at()
         looks = [text.partition(", so ")[0] for _, text in summary.looks_at_speeds(context, ["roll"])]
         assert looks == told
         assert not [*summary.looks_at_speeds(context, ["pitch"])]
+
+
+def test_the_log_that_leaves_the_fitted_positions_most_is_to_be_looked_at():
+    shares = [replace(path_share(log), outside=share) for log, share in (("a", 0.05), ("b", np.nan), ("c", 0.23))]
+    for count, told in ((2, []), (3, ["**Roll, c**: 23 % of its samples are beyond the positions of all fitted logs"])):
+        context = SimpleNamespace(
+            catalogue=Catalogue(lambda kind, some=shares[:count]: some if kind is PathShare else [])
+        )
+        looks = [text.partition(", so ")[0] for _, text in summary.looks_at_positions(context, ["roll"])]
+        assert looks == told
+        assert not [*summary.looks_at_positions(context, ["pitch"])]
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

@@ -23,6 +23,7 @@ FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
 STATIC_FRICTION = ("Coulomb friction", "Stribeck friction")  # parameters that add up at standstill
 # Fields of a record with the coefficients of the bias, in the order of `maths.models.terms`.
 BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
+OUTSIDE_MARGIN = 0.05  # of the fitted range of positions, on either side
 MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest singular value are not refitted
 
 
@@ -125,6 +126,15 @@ class Identified:
         """Return the speed of a recording over that of the fastest fitted log; NaN if no fitted path is known."""
         paths = self._paths.get(motion.joint)
         return speed_of(motion.dq) / paths.speed if paths is not None else np.nan
+
+    def outside(self, motion: Motion) -> float:
+        """Return the share of samples beyond the positions of all fitted paths, with a margin; NaN without any."""
+        paths = self._paths.get(motion.joint)
+        if paths is None:
+            return np.nan
+        low, high = float(paths.q.min()), float(paths.q.max())
+        margin = OUTSIDE_MARGIN * (high - low)
+        return float(np.mean((motion.q < low - margin) | (motion.q > high + margin)))
 
 
 class LogModels:

@@ -59,15 +59,16 @@ class Prediction(LogJointRecord):
 class PathShare(LogJointRecord):
     """The share of a joint's path that no other identification log follows, and the share of time in motion.
 
-    Also its speed over that of the fastest identification log.
+    Also its speed over that of the fastest identification log, and the share of samples beyond fitted positions.
     """
 
-    PUBLISHED = ("path.{log}.{joint}: path_new speed_ratio moving",)
+    PUBLISHED = ("path.{log}.{joint}: path_new speed_ratio outside moving",)
 
     role: str
     path_new: float
     moving: float
     speed_ratio: float  # NaN where no fitted path is known
+    outside: float  # likewise
 
 
 class JointModel(LogJointRecord):

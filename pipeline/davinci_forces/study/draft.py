@@ -171,6 +171,7 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
         yield f"# tool = {{ length = {robot.tool.length} }}  # [m] {why}"
     yield ""
     yield "[settings]  # every key has a default; the report lists the values used"
+    yield f"# effort = {{ {robot.joints[0].name} = 0.5 }}  # [N m or N] to detect; verdicts then follow from it"
     yield "# harmonics = 0  # to keep in the position of a periodic motion; 0 keeps those that it has"
     yield "# delay = 0.1  # [s] by which the filter may show a push late; a longer delay lowers its noise"
     yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"

@@ -135,7 +135,7 @@ def never_together(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnosti
     joints = [joint.name for joint in robot.joints if joint.name in moved]
     if robot.chain is not None and len(joints) > 1 and not any(log.is_moving.sum() >= len(joints) for log in logs):
         text = f"arm: no identification log moves {join_names(joints)} together, so the effort that each needs for the "
-        remedy = f"record an excitation of all joints together: {excite_command(robot, 'all')}"
+        remedy = f"where they move together, record an excitation of all: {excite_command(robot, 'all')}"
         yield diagnostic("choose", "together", "warning", f"{text}motion of the others is not identified; {remedy}")
 
 

@@ -188,7 +188,7 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
             reach = joint.unit(f"{what} from {low:.3g} to {high:.3g} {{position}}{unit}")
             beyond.append(f"{reach} where the robot states {least:.3g} to {most:.3g}")
     if beyond:
-        remedy = "correct its limits, by which `excite` designs, or the units"
+        remedy = "correct the units, or `limits` in [robot_overrides], by which `excite` designs"
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"
         yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", "note", text)
 

@@ -282,6 +282,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
     yield from looks_at_speeds(context, [trusted.joint for trusted in trusts])
+    yield from looks_at_positions(context, [trusted.joint for trusted in trusts])
     yield from looks_at_masses(context)
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     fitted = [log.name for log in context.study.logs if log.role == "identification"]
@@ -343,6 +344,20 @@ def looks_at_speeds(context: Context, joints: list[str]) -> Iterator[tuple[float
     text = f"it moves {ratio} times as fast as in any fitted log, so its model extrapolates, and errors may be larger."
     name = f"**{title(fastest.joint)}, {literal(fastest.log)}**"
     yield fastest.speed_ratio / verdicts.MAX_SPEED_RATIO, f"{name}: {text} Record an identification log as fast."
+
+
+def looks_at_positions(context: Context, joints: list[str]) -> Iterator[tuple[float, str]]:
+    """Yield a caveat for the joint and log that leave the fitted positions most."""
+    shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
+    farthest = max(shares, key=lambda share: np.nan_to_num(share.outside), default=None)
+    if farthest is None or not farthest.outside > verdicts.MAX_OUTSIDE:
+        return
+    text = f"{percent(farthest.outside)} of its samples are beyond the positions of all fitted logs, so its model"
+    name, remedy = (
+        f"**{title(farthest.joint)}, {literal(farthest.log)}**",
+        "Record an identification log that goes as far.",
+    )
+    yield farthest.outside / verdicts.MAX_OUTSIDE, f"{name}: {text} extrapolates there. {remedy}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:

@@ -118,7 +118,10 @@ def currents_in_words(context: Context) -> str:
         factor = str(Number(joint.effort_per_ampere, joint.unit("{effort}"), digits=3))
         joints.setdefault(factor, []).append(name_in_sentence(joint.name))
     factors = [f"{factor} on {as_list(names)}" for factor, names in joints.items()]
-    return f" 1 A of a motor counts as {'; '.join(factors)}." if factors else ""
+    stated = context.study.changed
+    listed = [joint.name for joint in context.study.joints_by_current if joint.name not in stated]
+    whose = " (by the robot’s description: check your drives)" if listed else ""
+    return f" 1 A of a motor counts as {'; '.join(factors)}{whose}." if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
