@@ -489,6 +489,31 @@ def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Conte
     assert marked.x.tolist() == [int(row[2]) for row in table.rows]
 
 
+def test_contacts_of_several_joints_at_one_time_are_one_row(full: Context):
+    [contact, *_] = full.catalogue.select(Contact, log="tip")
+    times = {
+        "hand_roll": ([1.0, 5.0, 9.0], [2.0, 6.0, 9.5]),
+        "hand_pitch": ([1.5, 7.0], [3.0, 8.0]),
+    }
+    above = {"hand_roll": [1, 1, 0], "hand_pitch": [1, 1]}
+    contacts = [
+        replace(contact, joint=joint, above=np.array(above[joint]), **{
+            name: np.array(ends if name == "release" else starts, float) if name in ("onset", "release")
+            else np.resize(getattr(contact, name), len(starts)) for name in contact.columns() if name != "above"
+        })
+        for joint, (starts, ends) in times.items()
+    ]  # fmt: skip
+    [table] = contacts_section.by_time(full, contacts)
+    assert [(row[0], row[1]) for row in table.rows] == [
+        ("tip", "1.0 to 3.0 s"),
+        ("tip", "5.0 to 6.0 s"),
+        ("tip", "7.0 to 8.0 s"),
+    ]
+    assert "–" not in table.rows[0]
+    assert (table.rows[1][3], table.rows[2][2]) == ("–", "–")
+    assert not [*contacts_section.by_time(full, contacts[:1])]
+
+
 def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):
     [contact, *_] = full.catalogue.records(Contact)
     contacts = [replace(contact, joint=joint) for joint in ("instrument_slide", "hand_pitch", "hand_roll")]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Contact, Stiffness, Track, Weight
+from davinci_forces.records import Contact, Stiffness, Track, Weight, by_name
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
@@ -36,6 +36,7 @@ def section(context: Context) -> Iterator[Block]:
             f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(context, contacts)
+        yield from by_time(context, contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. No.: "
             "number of the window in [@contact-peaks]. "
@@ -62,6 +63,33 @@ def section(context: Context) -> Iterator[Block]:
     if unused:
         columns = ("Log", "Joint", "Reason, and remedy")
         yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
+
+
+def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
+    """The peaks of contacts on several joints of a log, those at the same time in a row."""
+    touching = {log: of for log, of in by_name(contacts, "log").items() if len(of) > 1}
+    joints = context.joints_of([contact for of in touching.values() for contact in of])
+    rows = []
+    for log, of in touching.items():
+        windows = sorted((c.onset[i], c.release[i], c.joint, i) for c in of for i in np.flatnonzero(c.above))
+        groups: list[list[tuple[float, float, str, int]]] = []
+        for window in windows:
+            if groups and window[0] < max(end for _, end, *_ in groups[-1]):
+                groups[-1].append(window)
+            else:
+                groups.append([window])
+        for group in groups:
+            first, last = min(start for start, *_ in group), max(end for _, end, *_ in group)
+            touched = {joint: f"contact.{log}.{joint}.{i + 1}.peak" for _, _, joint, i in group}
+            peaks = (context.number(touched[joint]) if joint in touched else "–" for joint in joints)
+            rows.append((literal(log), f"{first:.1f} to {last:.1f} s", *peaks))
+    if rows:
+        caption = (
+            "Contacts of several joints by their time: the peak on each joint that exceeds its detection level, where "
+            "windows overlap in one row."
+        )
+        header = ("Log", "Time", *map(title, joints))
+        yield Table(caption, header, tuple(rows), "contacts-by-time", "ll" + "r" * len(joints))
 
 
 def alarm_levels(context: Context, contacts: list[Contact]) -> str:
