@@ -17,6 +17,7 @@ from davinci_forces.identification.identifiability import (
     moving_with,
     why_not_positive,
 )
+from davinci_forces.maths.estimation import least_squares
 from davinci_forces.maths.estimation.least_squares import (
     analyse_columns,
     correlated_pairs,
@@ -79,6 +80,15 @@ def test_a_combination_of_three_is_named_where_no_two_of_them_are_alike():
     ((members, ratio),) = uncertain_combinations(found, 20.0, 0.1)
     assert members == (0, 2, 4)
     assert ratio == pytest.approx(found.condition)
+
+
+def test_a_combination_of_two_is_named_unless_they_are_a_reported_pair_or_one_alone(monkeypatch):
+    combinations = [((0, 1), 30.0), ((1, 2), 40.0), ((3,), 50.0)]
+    monkeypatch.setattr(least_squares, "correlated_pairs", lambda *given: [(1, 2, 0.97)])
+    monkeypatch.setattr(least_squares, "uncertain_combinations", lambda *given: combinations)
+    pair, combination = describe_correlated(list("abcd"), of(PHI))
+    assert pair == "the estimates of b and c are correlated: 0.97"
+    assert combination.startswith("one combination of a and b is 30 times less certain")
 
 
 def test_a_parameter_that_cannot_be_told_from_zero_is_not_seen_and_its_share_is_bounded():

@@ -454,6 +454,9 @@ def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Cont
     two |= {"loaded": np.array(["hand_roll", "instrument_slide"], object), "mass_alone": shown}
     turned = replace(of, mass=-0.1, mass_std=0.001, differing="", side="not told", **two)
     assert weight_section.turned_joint(turned) == "instrument_slide"
+    one = replace(turned, **{name: getattr(turned, name)[:1] for name in turned.columns()})
+    told = ["if they agree" in weight_section.by_joint(full, each).caption for each in (turned, one)]
+    assert told == [True, False]
     verdict = weight_section.verdict(full, turned)
     assert verdict.level == "warn"
     assert "the positive direction of the instrument slide is not that of the robot's chain" in verdict.text
