@@ -318,12 +318,12 @@ def test_the_speed_of_a_log_is_compared_with_that_of_the_fastest_fitted_one(fast
     motion = arm.motion(scaled(faster, seed=9, log="other"))
     assert identified.speed_ratio(motion) == pytest.approx(faster, rel=0.02)
     if faster < 1.0:
-        assert identified.outside(motion) == 0.0
+        assert identified.share_outside(motion) == 0.0
     else:
         low, high = fitted[0].q.min(), fitted[0].q.max()
         margin = 0.05 * (high - low)
         beyond = np.mean((motion.q < low - margin) | (motion.q > high + margin))
-        assert identified.outside(motion) == pytest.approx(beyond, abs=0.01)
+        assert identified.share_outside(motion) == pytest.approx(beyond, abs=0.01)
         assert beyond > 0.2
 
 

@@ -587,7 +587,7 @@ def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond
     assert at(1.1) != at(1.9)
     for times in (1.1, 1.9):
         assert (
-            "rad where the robot states -0.6 to 0.6; correct its limits, by which `excite` designs, or the units"
+            "rad where the robot states -0.6 to 0.6; correct the units, or `limits` in [robot_overrides], by which "
             in at(times)
         )
     for times in (2.1, 19.0):

@@ -418,7 +418,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     (other / "study.toml").write_text((study / "study.toml").read_text())
     monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest",))
     said = call("all")
-    assert said.startswith("raw/elsewhere: skipped, as none of their logs is here; the study.toml of each says where")
+    assert said.startswith("raw/elsewhere: skipped, as none of its logs is here; the study.toml of each says where")
     assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()
 
 

@@ -36,7 +36,7 @@ def test_all_passes_over_the_thesis_until_it_is_simulated_and_prints_the_command
     (study / "study.toml").write_text(text)
     monkeypatch.chdir(tmp_path)
     (said,) = call("all").splitlines()
-    assert said.startswith("raw/davinci-thesis: skipped, as none of their logs is here")
+    assert said.startswith("raw/davinci-thesis: skipped, as none of its logs is here")
     assert "`davinci-forces simulate davinci-thesis raw/davinci-thesis`" in said
     assert [file.name for file in study.iterdir()] == ["study.toml"]
 

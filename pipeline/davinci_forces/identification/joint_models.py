@@ -127,7 +127,7 @@ class Identified:
         paths = self._paths.get(motion.joint)
         return speed_of(motion.dq) / paths.speed if paths is not None else np.nan
 
-    def outside(self, motion: Motion) -> float:
+    def share_outside(self, motion: Motion) -> float:
         """Return the share of samples beyond the positions of all fitted paths, with a margin; NaN without any."""
         paths = self._paths.get(motion.joint)
         if paths is None:

@@ -47,7 +47,7 @@ def run(
         if not motion.at_rest:
             identified, moving = along.identified, float(np.mean(motion.standing == 0))
             new, speed = identified.path_new(motion), identified.speed_ratio(motion)
-            outside = identified.outside(motion)
+            outside = identified.share_outside(motion)
             yield PathShare(motion.log, motion.joint, motion.role, new, moving, speed, outside)
             if entry.role != "identification":
                 yield from predict_joint(motion, along, entry, lowpass, fit)
