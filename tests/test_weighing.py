@@ -397,9 +397,9 @@ def test_the_side_that_the_mass_does_not_hang_on_tells():
 
 
 def test_a_side_that_no_effort_tells_is_called_so_in_the_words_that_the_report_knows():
-    assert weigh.side_of(0.0, 1.0) in SIDES
-    assert weigh.side_of(-9.0, 1.0) == "the other one"
-    assert weigh.side_of(-9.0, -0.06) in SIDES  # no mass is negative
+    assert weigh.side_of(0.0, 1.0) not in SIDES
+    assert weigh.side_of(-9.0, -0.06) not in SIDES  # no mass is negative
+    assert (weigh.side_of(9.0, 1.0), weigh.side_of(-9.0, 1.0)) == SIDES
 
 
 def test_an_offset_of_the_day_costs_no_mass():

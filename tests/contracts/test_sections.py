@@ -49,7 +49,7 @@ from davinci_forces.report.content import (
     walk,
 )
 from davinci_forces.report.content.layout import number_blocks
-from davinci_forces.report.content.marks import Points, VSpan
+from davinci_forces.report.content.marks import Line, Points, VSpan
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (
@@ -447,6 +447,15 @@ def test_a_negative_lifted_mass_reverses_the_direction_of_its_joint(full: Contex
     assert "write `sign = -1` with its position, velocity and effort, all three" in text
 
 
+def test_the_mirrored_side_is_shown_where_the_efforts_tell_a_side_of_any_mass(full: Context):
+    [of, *_] = full.catalogue.records(Weight)
+    for sides, told in ((("not told", "not told"), False), (("not told", "as stated"), True)):
+        table = weight_section.summary(full, [replace(of, side=side) for side in sides])
+        assert ("Better side" in table.header) == ("Mirrored:" in table.caption) == told
+        assert {len(row) for row in table.rows} == {len(table.header)} == {len(table.align)}
+    assert [row[-1] for row in table.rows] == ["undecided", "as stated"]
+
+
 def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Context):
     [of, *_] = full.catalogue.records(Weight)
     shown = np.array([0.1, -0.3])
@@ -515,6 +524,16 @@ def test_contacts_of_several_joints_at_one_time_are_one_row(full: Context):
     assert "–" not in table.rows[0]
     assert (table.rows[1][3], table.rows[2][2]) == ("–", "–")
     assert not [*contacts_section.by_time(full, contacts[:1])]
+
+
+def test_noise_that_would_hide_the_band_is_not_drawn(full: Context):
+    track = full.catalogue.records(Track)[0]
+    k = np.arange(len(track))
+    quiet = replace(track, tau_ext_smooth=np.sin(0.01 * k), tau_ext_smooth_std=0.1 + 0.0 * k)
+    for size, names in ((1.0, ["measured minus model", "smoother"]), (10.0, ["smoother"])):
+        noisy = replace(quiet, tau_ext_direct=size * np.where(k % 2, 1.0, -1.0))
+        panel = runs.external_effort_panel(noisy)
+        assert [mark.label for mark in panel.marks if isinstance(mark, Line)] == names
 
 
 def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):

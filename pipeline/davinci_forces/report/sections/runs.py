@@ -21,6 +21,7 @@ from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
 WORST = "the worst run of this joint in free space"
 ON_PAPER = 2  # joints whose worst run is drawn in the PDF
+NOISY = 2.0  # noise over the range of the band, above which it is not drawn
 LEVELS = ("free_rms", "detection_level")
 
 
@@ -90,7 +91,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     largest = float(abs(t.tau_ext_smooth[shown_rows(t)]).max(initial=0.0))
     return Figure(
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
-        "with a band of two standard deviations, and measured minus modelled effort.",
+        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band.",
         f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
@@ -109,13 +110,15 @@ def shown_rows(t: Track) -> slice:
 
 
 def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
-    """The external effort over time with its band, and measured minus modelled effort."""
+    """The external effort over time with its band, and measured minus modelled effort unless its noise hides them."""
     shown, effort, upper = shown_rows(t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
     lower = effort - upper
     upper += effort  # in place, as a column of a long log takes much memory
+    direct, room = t.tau_ext_direct[shown], float(upper[shown].max() - lower[shown].min())
+    is_noisy = float(direct.max() - direct.min()) > NOISY * room
     marks: tuple[AnyMark, ...] = (
         *spans,
-        Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
+        *([] if is_noisy else [Line(t.t[shown], direct, "measured minus model", "grey", "dotted")]),
         Band(t.t[shown], lower[shown], upper[shown], "± 2 σ (total)", "sky"),
         Line(t.t[shown], effort[shown], "smoother", "vermillion"),
     )

@@ -14,7 +14,7 @@ from davinci_forces.report.context import Context, label, name_in_sentence, titl
 from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, percent
 
-SIDES = {"not told": "undecided"}  # words of the table for the sides in records
+SIDES = ("as stated", "the other one")  # that the efforts tell
 
 
 @section_of("Attached masses", "weight")
@@ -48,18 +48,30 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows = []
+    rows, told = [], any(weight.side in SIDES for weight in weights)
     for weight in weights:
-        stated, side = str(Number(weight.stated_mass, "kg")), SIDES.get(weight.side, weight.side)
-        numbers = context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale"))
-        rows.append((literal(weight.log), literal(weight.moves_with or "tip"), stated, *numbers, side))
-    caption = (
-        "Masses with their standard errors, each at its position and mirrored to the other side of the link, in case "
-        "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
-        "two standard errors. The scale is the estimated mass divided by the stated mass."
+        stated, prefix = str(Number(weight.stated_mass, "kg")), f"weight.{weight.log}"
+        sides = (
+            (context.number(f"{prefix}.mass_mirrored"), weight.side if weight.side in SIDES else "undecided")
+            if told
+            else ()
+        )
+        numbers = context.numbers(prefix, ("mass", "scale"))
+        rows.append((literal(weight.log), literal(weight.moves_with or "tip"), stated, *numbers, *sides))
+    caption = "Masses with their standard errors. The scale is the estimated mass divided by the stated mass."
+    caption += (
+        " Mirrored: the mass at the mirrored position on its link, in case the sign of the position is wrong. Better "
+        "side: the side with the smaller residual, if they differ by two standard errors."
+    ) * told
+    header = (
+        "Log",
+        "Moves with joint or link",
+        "Stated",
+        "Mass",
+        "Scale",
+        *(("Mirrored", "Better side") if told else ()),
     )
-    header = ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side")
-    return Table(caption, header, rows, "weight-table", "llrrrrl")
+    return Table(caption, header, rows, "weight-table", "llrrr" + "rl" * told)
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
