@@ -167,7 +167,8 @@ class IdentifiedArm:
     def predict(self, t: Samples, q: Samples, dq: Samples = None) -> pd.DataFrame:
         """Predict the effort of free motion: a row a time, columns (joint, `tau`) and (joint, `std`).
 
-        The standard deviation is that of the measured effort about it, smoothed, as calibrated on free motion.
+        The standard deviation is that of the low-passed measured effort about it, as calibrated on free motion.  Single
+        samples of the measured effort scatter by their noise, too.
 
         Raises
         ------

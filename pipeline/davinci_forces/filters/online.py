@@ -255,7 +255,7 @@ class OnlineJoint:
     @property
     def has_converged(self) -> bool:
         """Whether the filter has run long enough to have forgotten how it began."""
-        return self.steps * self.T_s > TRANSIENT
+        return bool(self.steps * self.T_s > TRANSIENT)
 
     def effort(self, q: float, dq: float, ddq: float, of_links: float) -> float:
         """The model's effort at a motion, with the effort of the links."""

@@ -65,7 +65,7 @@ def search_tables(context: Context) -> Iterator[Block]:
             for step, cutoff, lag, ridge, parameters, score in zip(*columns, strict=True)
         )
         rows, last = rows[: search.chosen_step + 1], len(search) - 1
-        end = f" The last step, {last}, reaches {search.score[last]:.4f}, which is not clearly less."
+        end = f" A further step would reach {search.score[last]:.4f}, which is not clearly less."
         caption = f"{title(search.joint)}, {search.structure}: relative error after each step of the search."
         caption += end if search.chosen_step < last else " No further step reduced the error."
         yield Table(caption, header, rows, f"search-{search.joint}", "lrrrrr")

@@ -57,7 +57,8 @@ def section(context: Context) -> Iterator[Block]:
             yield Prose(
                 f"**{', '.join(unknown)}**: where nothing touched the arm is not stated, so the levels do not know its "
                 "path. A small contact that comes back with the period, or at reversals, is an error of the model. "
-                "State windows without contact, `free = [[start, end], ...]`, and the levels hold for this path, too."
+                "State windows without contact, `free = [[start, end], ...]`, and the levels hold for this path, too. "
+                "They may be read off this report, a second away from every contact, and stand beside contact windows."
             )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
@@ -71,7 +72,7 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
     joints = context.joints_of([contact for of in touching.values() for contact in of])
     rows = []
     for log, of in touching.items():
-        windows = sorted((c.onset[i], c.release[i], c.joint, i) for c in of for i in np.flatnonzero(c.above))
+        windows = sorted((c.onset[i], c.release[i], c.joint, i) for c in of for i in np.flatnonzero(c.above).tolist())
         groups: list[list[tuple[float, float, str, int]]] = []
         for window in windows:
             if groups and window[0] < max(end for _, end, *_ in groups[-1]):

@@ -104,17 +104,21 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
 
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
     """Every log filtered as samples arrive, beside the smoother."""
-    names, of_joint = ("stream_delay", "free_rms", "stream_loss", "peak_ratio"), ("alarm_level", "contacts_found")
-    rows = []
+    names = ("stream_delay", "free_rms", "stream_loss", "peak_ratio")
+    rows, named = [], set[str]()
     for s in logs:
-        of_log = context.numbers(f"stream.{s.log}.{s.joint}", names, 2)
-        rows.append((*run_cells(s)[::-1], *of_log, *context.numbers(f"stream.{s.joint}", of_joint, 2)))
+        of_log, prefix = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}"
+        of_joint: tuple[Cell, ...] = ("", "")  # once for all its logs
+        if s.joint not in named:
+            of_joint = context.number(f"{prefix}.alarm_level", 2), context.count(f"{prefix}.contacts_found")
+        named.add(s.joint)
+        rows.append((*run_cells(s)[::-1], *of_log, *of_joint))
     caption = (
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
         "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
         "delays, over the smoother's. Alarm level: free motion like that of the joint's logs crosses it at most "
-        "once in ten minutes. Contacts found: the number of measured contacts that exceed it."
+        "once in ten minutes. Contacts found: the number of the joint's measured contacts that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(caption, header, rows, "stream", "llrrrrrr")

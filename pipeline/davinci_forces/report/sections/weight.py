@@ -48,12 +48,12 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows, told = [], any(weight.side in SIDES for weight in weights)
+    rows, sided = [], any(weight.side in SIDES for weight in weights)
     for weight in weights:
         stated, prefix = str(Number(weight.stated_mass, "kg")), f"weight.{weight.log}"
         sides = (
             (context.number(f"{prefix}.mass_mirrored"), weight.side if weight.side in SIDES else "undecided")
-            if told
+            if sided
             else ()
         )
         numbers = context.numbers(prefix, ("mass", "scale"))
@@ -62,16 +62,16 @@ def summary(context: Context, weights: list[Weight]) -> Table:
     caption += (
         " Mirrored: the mass at the mirrored position on its link, in case the sign of the position is wrong. Better "
         "side: the side with the smaller residual, if they differ by two standard errors."
-    ) * told
+    ) * sided
     header = (
         "Log",
         "Moves with joint or link",
         "Stated",
         "Mass",
         "Scale",
-        *(("Mirrored", "Better side") if told else ()),
+        *(("Mirrored", "Better side") if sided else ()),
     )
-    return Table(caption, header, rows, "weight-table", "llrrr" + "rl" * told)
+    return Table(caption, header, rows, "weight-table", "llrrr" + "rl" * sided)
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:
