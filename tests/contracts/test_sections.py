@@ -77,7 +77,7 @@ from davinci_forces.report.sections import (
 )
 from davinci_forces.report.sections.joints.estimators import correlations
 from davinci_forces.report.sections.parts import trust
-from davinci_forces.report.sections.summary import opening
+from davinci_forces.report.sections.summary import caveats, opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study import Source
 from davinci_forces.study.review import Rating
@@ -322,7 +322,7 @@ def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):
 @pytest.mark.parametrize(("sought", "said"), [(0.1, "hides efforts of"), (0.4, "is more than a third of"), (5.0, "")])
 def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(full: Context, sought, said):
     space = replace(full.catalogue.records(FreeSpace)[0], detection_level=0.2, coverage=0.95)
-    looks = [text for _, text in summary.looks_at_band(full, Trust("hand_roll", None, space, sought))]
+    looks = [text for _, text in caveats.looks_at_band(full, Trust("hand_roll", None, space, sought))]
     assert len(looks) == bool(said)
     assert all(said in text for text in looks)
 
@@ -330,7 +330,7 @@ def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(ful
 def test_an_error_that_is_mostly_constant_is_named_with_what_is_left_without_it(full: Context):
     p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.mean_error" in full.results)
     p = replace(p, model_error=0.5, mean_error=0.4, mean_error_std=0.01, effort_rms=1.0)
-    [(_, text)] = summary.looks_at_model(full, Trust("hand_roll", p, None, None))
+    [(_, text)] = caveats.looks_at_model(full, Trust("hand_roll", p, None, None))
     assert f"; {full.size(p, 'model_error', 0.3, 2)} without its constant part, " in text
 
 
@@ -338,7 +338,7 @@ def test_an_error_of_twice_the_effort_suggests_a_wrong_sign(full: Context):
     p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.model_error" in full.results)
     for share, suggests in ((2.04, True), (1.5, False)):
         trusted = Trust("hand_roll", replace(p, model_error=share, mean_error=0.0, effort_rms=1.0), None, None)
-        [(_, text)] = summary.looks_at_model(full, trusted)
+        [(_, text)] = caveats.looks_at_model(full, trusted)
         assert ("wrong `sign`" in text) == suggests
 
 
@@ -386,7 +386,7 @@ def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
     wrong = diagnostic("resample", "push.hand_roll", "warning", "the logged velocity is twice its derivative")
     said = Catalogue(lambda kind: [*catalogue.records(kind), *([wrong] if kind is Diagnostic else [])])
     about = context(lab, said)
-    [first, *_] = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
+    [first, *_] = caveats.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
     assert first == "the logged velocity is twice its derivative"
 
 
@@ -397,7 +397,7 @@ def test_remarks_that_differ_in_their_log_and_their_numbers_alone_take_one_place
     remarks = [diagnostic("resample", text.partition(":")[0], "warning", text) for text in texts]
     remarks.append(diagnostic("resample", "log_1", "warning", "log_1: another remark"))
     about = context(lab, Catalogue(lambda kind: [*catalogue.records(kind), *(remarks if kind is Diagnostic else [])]))
-    first, second, *_ = summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
+    first, second, *_ = caveats.first_looks_in_order(about, [parts.trust(about, "hand_roll")])
     assert first == "log_1/hand_roll: harmonic 1 of the position is 1 % of the largest (4 more remarks of this kind)"
     assert second == "log_1: another remark"
 
@@ -414,7 +414,7 @@ def test_a_unit_fault_that_the_filter_finds_comes_before_harmonics_and_a_small_h
     }
     kinds = {Spectrum: [cut], Diagnostic: [diagnostic(stage, "push", "warning", x) for stage, x in remarks.items()]}
     about = context(lab, Catalogue(lambda kind: kinds.get(kind, [])))
-    looks = summary.first_looks_in_order(about, [])
+    looks = caveats.first_looks_in_order(about, [])
     assert looks[0] == remarks["ekf"]
     assert looks.index(remarks["differentiate"]) == place
 
@@ -429,7 +429,7 @@ def test_page_one_names_a_parameter_of_the_used_model_that_no_mechanism_has(full
     fits = [replace(used, **values) if fit is used else fit for fit in full.catalogue.records(Fit)]
     about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))
     name = parts.of_joint(used, "hand_roll")[row]
-    told = [text for _, text in summary.looks_at_parameters(about, "hand_roll") if f"negative {name}" in text]
+    told = [text for _, text in caveats.looks_at_parameters(about, "hand_roll") if f"negative {name}" in text]
     assert len(told) == is_told
 
 
@@ -442,8 +442,8 @@ def test_a_negative_lifted_mass_reverses_the_direction_of_its_joint(full: Contex
     names[row], theta[row] = f"lifted mass{suffix}", -10.0 * used.theta_std[row]
     fits = [replace(used, parameter=names, theta=theta) if fit is used else fit for fit in full.catalogue.records(Fit)]
     about = replace(full, catalogue=Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind)))
-    [(first, text)] = summary.looks_at_parameters(about, "hand_roll")
-    assert first == summary.FIRST
+    [(first, text)] = caveats.looks_at_parameters(about, "hand_roll")
+    assert first == caveats.FIRST
     assert "write `sign = -1` with its position, velocity and effort, all three" in text
 
 
@@ -484,10 +484,10 @@ def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: C
     [trust] = trusts(full, hand_roll=0.05)
     assert trust.space is not None
     narrow = replace(trust, space=replace(trust.space, coverage=0.3))
-    [(_, text)] = summary.looks_at_band(full, narrow)
+    [(_, text)] = caveats.looks_at_band(full, narrow)
     assert "it covers only 30 % of free-space samples. More logs of free motion" in text
     [wrong] = trusts(full, hand_roll=1.0)
-    [(_, text)] = summary.looks_at_band(full, replace(wrong, space=narrow.space))
+    [(_, text)] = caveats.looks_at_band(full, replace(wrong, space=narrow.space))
     assert "it covers only 30 % of free-space samples. See" in text
 
 
@@ -601,7 +601,7 @@ def test_a_warning_that_no_effort_is_estimated_is_the_first_to_look_at(lab: Lab,
     text = "push/hand_roll: the inertia is not positive, so its external effort is not estimated"
     lost = diagnostic("predict", "push.hand_roll.model", "warning", text)
     about = context(lab, Catalogue(lambda kind: [*catalogue.records(kind), *([lost] if kind is Diagnostic else [])]))
-    assert summary.first_looks_in_order(about, [parts.trust(about, "hand_roll")])[0] == text
+    assert caveats.first_looks_in_order(about, [parts.trust(about, "hand_roll")])[0] == text
 
 
 def test_the_value_of_a_peak_is_left_out_beside_a_larger_one(lab: Lab, catalogue: Catalogue):
@@ -752,7 +752,7 @@ def test_the_coverage_of_page_one_is_the_lowest_of_all_logs_that_were_not_fitted
     trusted = trust(about, "hand_roll")
     assert (trusted.space.log, trusted.narrowest.log) == ("check", "push")
     assert trusted.narrow
-    assert any("hand_roll" not in text and "push" in text for _, text in summary.looks_at_band(about, trusted))
+    assert any("hand_roll" not in text and "push" in text for _, text in caveats.looks_at_band(about, trusted))
 
 
 def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):
@@ -782,7 +782,7 @@ def test_a_fault_of_a_candidate_stands_beside_the_fits_and_not_on_page_one(full:
     about = replace(full, catalogue=records)
     [bullets] = [block for block in joints.comparison(about, fits).blocks if isinstance(block, Bullets)]
     assert bullets.items == (remark.text[0],)
-    assert not any("inertia" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05)))
+    assert not any("inertia" in text for _, text in caveats.looks_at(about, trusts(full, hand_roll=0.05)))
 
 
 def test_advice_that_a_failed_log_may_have_followed_is_not_on_page_one(full: Context, catalogue: Catalogue):
@@ -792,7 +792,7 @@ def test_advice_that_a_failed_log_may_have_followed_is_not_on_page_one(full: Con
     for failed, is_told in (("identification", False), ("contact", True)):
         failures = {f"ingest {roles[failed]}": "there is no channel 'q'"}
         about = replace(full, catalogue=records, provenance=replace(full.provenance, failures=failures))
-        assert any("together" in text for _, text in summary.looks_at(about, trusts(full, hand_roll=0.05))) == is_told
+        assert any("together" in text for _, text in caveats.looks_at(about, trusts(full, hand_roll=0.05))) == is_told
 
 
 def test_the_middle_of_a_log_is_drawn_of_filters_that_are_compared(full: Context):
@@ -811,7 +811,7 @@ def test_a_joint_tested_on_its_own_path_comes_between_errors_of_a_third_and_of_a
     for share, first in ((0.33, "tested only on the path"), (0.55, "the model error is")):
         [other] = trusts(full, hand_roll=share)
         other = replace(other, prediction=replace(other.prediction, role="identification"))
-        looks = sorted(summary.looks_at(full, [other, same]), key=lambda look: -look[0])
+        looks = sorted(caveats.looks_at(full, [other, same]), key=lambda look: -look[0])
         texts = [text for _, text in looks if "model error is" in text or "tested only" in text]
         assert first in texts[0]
 
@@ -821,7 +821,7 @@ def test_a_joint_without_a_log_for_validation_is_told_to_record_one(full: Contex
     refitted = {"role": "identification", "path": "another path"}
     for scheme, is_told in (("leave a block of path out", True), ("leave a log out", False)):
         tested = replace(whole, prediction=replace(whole.prediction, scheme=scheme, **refitted), about=None)
-        told = [text for _, text in summary.looks_at(full, [tested]) if "tested only on parts of fitted logs" in text]
+        told = [text for _, text in caveats.looks_at(full, [tested]) if "tested only on parts of fitted logs" in text]
         assert bool(told) == is_told
         assert all("Record a validation log on another path." in text for text in told)
 

@@ -12,7 +12,7 @@ from davinci_forces.records import PathShare, TorqueConstant, Weight
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report import verdicts
 from davinci_forces.report.context import name_in_sentence
-from davinci_forces.report.sections import summary
+from davinci_forces.report.sections.summary import caveats
 from davinci_forces.report.sections.summary.opening import verdict_sentence
 from davinci_forces.report.verdicts import (
     Trust,
@@ -195,38 +195,28 @@ def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, lo
 def test_a_mass_that_differs_from_the_stated_one_is_to_be_looked_at_first(mass, is_told):
     of = weight(log="hung", mass=mass, mass_std=0.001, stated_mass=0.1)
     context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
-    told = [text for _, text in summary.looks_at_masses(context)]
+    told = [text for _, text in caveats.looks_at_masses(context)]
     assert told == ["**hung**: the mass is estimated 3 % too large, by 3.0 standard errors. See [@weight]."] * is_told
 
 
 def test_a_negative_mass_is_to_be_looked_at_before_all_that_it_spoils():
     of = weight(log="hung", mass=-0.103, mass_std=0.001, stated_mass=0.1)
     context = SimpleNamespace(catalogue=Catalogue(lambda kind: [of] if kind is Weight else []))
-    [(first, text)] = summary.looks_at_masses(context)
-    assert first == summary.FIRST
+    [(first, text)] = caveats.looks_at_masses(context)
+    assert first == caveats.FIRST
     assert text == "**hung**: the mass is negative, so a direction is reversed. See [@weight]."
 
 
-def test_of_motions_faster_than_all_fitted_ones_the_fastest_is_to_be_looked_at():
-    ratios = {"slow": 1.45, "unknown": np.nan, "fast": 1.6, "faster": 3.1}
-    shares = [replace(path_share(log), speed_ratio=ratio) for log, ratio in ratios.items()]
-    for count, told in ((2, []), (4, ["**Roll, faster**: it moves 3.1 times as fast as in any fitted log"])):
-        catalogue = Catalogue(lambda kind, some=shares[:count]: some if kind is PathShare else [])
-        context = SimpleNamespace(catalogue=catalogue, number=lambda key, digits: f"{ratios[key.split('.')[1]]}")
-        looks = [text.partition(", so ")[0] for _, text in summary.looks_at_speeds(context, ["roll"])]
-        assert looks == told
-        assert not [*summary.looks_at_speeds(context, ["pitch"])]
-
-
-def test_the_log_that_leaves_the_fitted_positions_most_is_to_be_looked_at():
-    shares = [replace(path_share(log), outside=share) for log, share in (("a", 0.05), ("b", np.nan), ("c", 0.23))]
-    for count, told in ((2, []), (3, ["**Roll, c**: 23 % of its samples are beyond the positions of all fitted logs"])):
-        context = SimpleNamespace(
-            catalogue=Catalogue(lambda kind, some=shares[:count]: some if kind is PathShare else [])
-        )
-        looks = [text.partition(", so ")[0] for _, text in summary.looks_at_positions(context, ["roll"])]
-        assert looks == told
-        assert not [*summary.looks_at_positions(context, ["pitch"])]
+def test_of_motions_faster_or_farther_than_all_fitted_ones_the_most_extreme_is_to_be_looked_at():
+    known = {"slow": (1.45, 0.05), "unknown": (np.nan, np.nan), "fast": (1.6, 0.0), "most": (3.1, 0.23)}
+    shares = [replace(path_share(log), speed_ratio=ratio, outside=out) for log, (ratio, out) in known.items()]
+    fastest = "**Roll, most**: it moves 3.1 times as fast as in any fitted log"
+    farthest = "**Roll, most**: 23 % of its samples are beyond all fitted positions"
+    for count, expected in ((2, []), (4, [fastest, farthest])):
+        context = SimpleNamespace(catalogue=Catalogue(lambda kind, n=count: shares[:n] if kind is PathShare else []))
+        looks = [text.partition(", so ")[0] for _, text in caveats.looks_at_reach(context, ["roll"])]
+        assert looks == expected
+        assert not [*caveats.looks_at_reach(context, ["pitch"])]
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

@@ -17,7 +17,8 @@ from davinci_forces.report.results import MANIFEST, collect, identity, manifest
 from davinci_forces.report.sections import DOCUMENTS, section_builder
 from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.sections.parts import trust
-from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, largest_peaks, trust_row
+from davinci_forces.report.sections.summary import fitted_joints, largest_peaks, trust_row
+from davinci_forces.report.sections.summary.caveats import first_looks_in_order
 from davinci_forces.report.sections.summary.opening import forces_at_tip, masses
 from davinci_forces.report.sections.tissue import verdict
 from davinci_forces.report.writers import render_all

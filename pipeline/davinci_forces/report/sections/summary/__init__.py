@@ -1,43 +1,26 @@
 """The answer: the external effort, how far to trust it, and what to look at first."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import (
-    Contact,
-    Diagnostic,
-    PathShare,
-    Prediction,
-    Record,
-    Spectrum,
-    Track,
-    Weight,
-    first_of_each_kind,
-)
+from davinci_forces.records import Contact, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import grade_of_mass, of_joint, scored_predictions, section_of, trust
+from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
-from davinci_forces.report.verdicts import Trust, band_in_words, is_mostly_constant, percent
+from davinci_forces.report.sections.summary.caveats import first_looks_in_order
+from davinci_forces.report.verdicts import Trust, band_in_words, percent
 from davinci_forces.robots.robot import Kind
 
-SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
-# In a warning of any stage that blames units, or leaves a joint without an answer.
-COMES_FIRST = re.compile(r"check the units|its external effort is not estimated")
-LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
-LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
-FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 TOUCHED: Colour = "sky"  # of contact windows
 REST: Colour = "yellow"  # of standstill
-NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
@@ -267,151 +250,3 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     band = trusted.narrowest
     covers = f"{percent(band.coverage)}, {band_in_words(band.coverage, band.coverage_std)}" if band is not None else "–"
     return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
-
-
-def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
-    """The three things to look at first, as marked texts, worst first."""
-    return tuple(text for _, text in sorted(looks_at(context, trusts), key=lambda look: -look[0])[:3])
-
-
-def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """Yield every caveat with its weight; 1 is where caution begins."""
-    for trusted in trusts:
-        yield from looks_at_model(context, trusted)
-        yield from looks_at_parameters(context, trusted.joint)
-        yield from looks_at_band(context, trusted)
-    yield from looks_at_paths(context, trusts)
-    yield from looks_at_speeds(context, [trusted.joint for trusted in trusts])
-    yield from looks_at_positions(context, [trusted.joint for trusted in trusts])
-    yield from looks_at_masses(context)
-    omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
-    fitted = [log.name for log in context.study.logs if log.role == "identification"]
-    lost = any(task.split(" ")[-1] in fitted for task in context.provenance.failures)
-    warnings = (
-        (diagnostic.stage, text)
-        for diagnostic in context.catalogue.records(Diagnostic)
-        for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True)
-        if severity == "warning" and not (lost and text.startswith(LACKS_LOGS))
-    )
-    for stage, text in first_of_each_kind(warnings):
-        by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
-        weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size
-        yield weight, literal(text.replace("`", ""))
-
-
-def omitted_share(spectrum: Spectrum) -> float:
-    """The largest harmonic that is not kept, over the largest of all; 0 if all are kept."""
-    omitted = spectrum.amplitude[spectrum.harmonics + 1 :].max(initial=0.0)
-    return float(omitted / (spectrum.amplitude[1:].max(initial=0.0) or 1.0))
-
-
-def looks_at_masses(context: Context) -> Iterator[tuple[float, str]]:
-    """Yield a caveat for each mass that is negative, or differs from the stated one."""
-    for weight in context.catalogue.records(Weight):
-        why = grade_of_mass(context, weight)[1]
-        if why == "sign":
-            yield FIRST, f"**{literal(weight.log)}**: the mass is negative, so a direction is reversed. See [@weight]."
-        if why == "scale":
-            share = abs(weight.mass / weight.stated_mass - 1.0)
-            away = abs(weight.mass - weight.stated_mass) / weight.mass_std
-            side = "large" if weight.mass > weight.stated_mass else "small"
-            text = f"the mass is estimated {100 * share:.2g} % too {side}, by {away:.1f} standard errors."
-            yield WARNING, f"**{literal(weight.log)}**: {text} See [@weight]."
-
-
-def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """Yield one caveat for all joints that were tested only on the path that was fitted, and one for parts of it."""
-    same = [trusted for trusted in trusts if trusted.same_path]
-    parts = [trusted for trusted in trusts if trusted.of_parts and not trusted.same_path]
-    where_tested = (
-        (4.0, same, "the path that was fitted ({}), where the model's error repeats."),
-        (2.0, parts, "parts of fitted logs ({}) that refits left out; on another path the error may be larger."),
-    )
-    for weight, some, where in (tested for tested in where_tested if tested[1]):
-        logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in some if trusted.prediction is not None)
-        names = ", ".join(title(trusted.joint) for trusted in some)
-        remedy = f"Record a validation log on another path.{see(context, Prediction, 'prediction')}"
-        yield weight, f"**{names}**: tested only on {where.format(', '.join(logs))} {remedy}"
-
-
-def looks_at_speeds(context: Context, joints: list[str]) -> Iterator[tuple[float, str]]:
-    """Yield a caveat for the joint and log that are fastest, compared with fitted logs."""
-    shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
-    fastest = max(shares, key=lambda share: np.nan_to_num(share.speed_ratio), default=None)
-    if fastest is None or not fastest.speed_ratio > verdicts.MAX_SPEED_RATIO:
-        return
-    ratio = context.number(f"path.{fastest.log}.{fastest.joint}.speed_ratio", 2)
-    text = f"it moves {ratio} times as fast as in any fitted log, so its model extrapolates, and errors may be larger."
-    name = f"**{title(fastest.joint)}, {literal(fastest.log)}**"
-    yield fastest.speed_ratio / verdicts.MAX_SPEED_RATIO, f"{name}: {text} Record an identification log as fast."
-
-
-def looks_at_positions(context: Context, joints: list[str]) -> Iterator[tuple[float, str]]:
-    """Yield a caveat for the joint and log that leave the fitted positions most."""
-    shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
-    farthest = max(shares, key=lambda share: np.nan_to_num(share.outside), default=None)
-    if farthest is None or not farthest.outside > verdicts.MAX_OUTSIDE:
-        return
-    text = f"{percent(farthest.outside)} of its samples are beyond the positions of all fitted logs, so its model"
-    name, remedy = (
-        f"**{title(farthest.joint)}, {literal(farthest.log)}**",
-        "Record an identification log that goes as far.",
-    )
-    yield farthest.outside / verdicts.MAX_OUTSIDE, f"{name}: {text} extrapolates there. {remedy}"
-
-
-def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """Yield a caveat where the model error calls for caution; it names a constant part that is most of the error."""
-    p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
-    if p is not None and trusted.share > verdicts.GOOD:
-        error, constant = context.results[f"{p.prefix}.model_error"].number(2), ""
-        if is_mostly_constant(p):
-            mean = context.results[f"{p.prefix}.mean_error"].number(2)
-            left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
-            constant = f"; {left} without its constant part, {mean}, as of another payload or an offset of the current"
-        opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
-        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}; "
-        text += f"that of a good model is at most {percent(verdicts.GOOD)}."
-        by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
-        yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
-
-
-def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, str]]:
-    """Yield a caveat if the model in use has parameters that no mechanism has."""
-    fit = context.used_record(joint) or context.fit_named(context.own_fit(joint), joint)
-    if fit is None:
-        return
-    impossible = [verdicts.is_impossible(*of) for of in zip(fit.theta, fit.theta_std, strict=True)]
-    if wrong := [name for i, name in of_joint(fit, joint).items() if fit.positive[i] and impossible[i]]:
-        text = f"the model in use has a negative {as_list(wrong)}, which no mechanism has. It predicts the effort as "
-        text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
-        text += "study.toml, `fit = 'independent.consistent'`."
-        if LIFTED_MASS in wrong:
-            text = (
-                "its lifted mass is negative. Unless a counterweight lifts it, its positive direction, and with it the "
-            )
-            text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
-        yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
-
-
-def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """Yield caveats where the detection level hides the effort sought, or the 95 % band is too narrow."""
-    space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
-    if space is None:
-        return
-    if trusted.sought and trusted.fineness > verdicts.DETECTED:
-        level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
-        hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
-        text = f"the detection level of {level} {hides} {sought}, which the study seeks."
-        yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
-    if trusted.narrow and trusted.narrowest is not None:
-        space = trusted.narrowest
-        covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
-        if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
-            covers += " More logs of free motion, at these speeds and on other days, calibrate it."
-        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
-
-
-def see(context: Context, kind: type[Record], anchor: str) -> str:
-    """A reference to a section, or "" where no record of that kind exists and so the section is missing."""
-    return f" See [@{anchor}]." if context.catalogue.records(kind) else ""
