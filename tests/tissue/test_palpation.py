@@ -15,7 +15,7 @@ from davinci_forces.maths.tissue.indentation import (
     slope_error,
     straight,
 )
-from davinci_forces.maths.tissue.palpation import Probing, between_troughs, orient_into_tissue
+from davinci_forces.maths.tissue.palpation import Probing, between_troughs, explained_share, orient_into_tissue
 from davinci_forces.maths.tissue.tissue import (
     LAWS,
     FittedLaw,
@@ -92,6 +92,21 @@ def test_the_stiffness_is_the_median_slope_of_the_pushes_that_are_straight():
     assert not set(models.law) & {"Kelvin-Voigt", "Hunt-Crossley"}  # there is no velocity without a clock
     assert np.isnan(tissue.onset).all()
     assert not said
+
+
+def test_noise_makes_no_push_crooked_and_a_crooked_one_stays_so():
+    rng, depth = np.random.default_rng(3), 0.01 * np.sin(np.linspace(0.0, np.pi, 1200))
+    ways = {"straight": 300.0 * depth, "crooked": 3e10 * depth**5}
+    noise = 0.45 * np.convolve(rng.normal(size=1205), np.ones(6), "valid") / 6**0.5  # of a low-pass over six samples
+    for way, force in ways.items():
+        for size, about in ((0.0, 1e-5), (1.0, 0.03)):
+            line = straight(depth, force + size * noise)
+            found = explained_share(depth, force + size * noise, line, 6)
+            assert found == pytest.approx(straight(depth, force).r2, abs=about), way
+            assert (found > 0.9) == (way == "straight")
+        assert line.r2 < 0.85
+    line = straight(depth, 5.0 * noise)
+    assert explained_share(depth, 5.0 * noise, line, 6) == 0.0
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])

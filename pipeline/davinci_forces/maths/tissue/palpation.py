@@ -23,7 +23,7 @@ MIN_RATIO_SIDES = 2.0  # the side of the median with this many times larger excu
 USUAL_SPEED_QUANTILE = 0.95  # quantile of the speeds of a push that is its usual speed
 MAX_DEPTH = 0.3  # [m] the unit of a larger depth is probably wrong
 MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e5  # [N/m]
-MIN_R2 = 0.9  # smallest R^2 of a straight line through a push that counts
+MIN_EXPLAINED = 0.9  # smallest share of its force, beyond noise, that a straight line explains of a push that counts
 MIN_EARLY_RISE = 0.05  # share of the force within the first quarter of the depth, if a push touches from its start
 MAX_NAMED = 5  # largest number of pushes that a remark names
 
@@ -168,6 +168,7 @@ class PalpatedPush(NamedTuple):
     k_unloading: float
     k_unloading_std: float
     k_std_model: float  # [N/m] by the error of a joint's model in the force
+    explained: float  # share of the force in contact, beyond its noise, that the line explains; NaN without contact
 
     @property
     def depth_in_contact(self) -> Array:
@@ -231,7 +232,22 @@ def _pushed(
     ways = (inside & loading, inside & ~loading)
     loaded, unloaded = (indentation.slope_with_std(depth[way], force[way], common) for way in ways)
     place, t = probing.place[part], probing.t[part]
-    return PalpatedPush(number, t, depth, force, d_rate, place, contact, line, *loaded, *unloaded, error)
+    spacing = max(int(np.ceil(rate / (2 * cutoff))), 1)
+    explained = explained_share(depth[inside], force[inside], line, spacing) if line else float("nan")
+    return PalpatedPush(number, t, depth, force, d_rate, place, contact, line, *loaded, *unloaded, error, explained)
+
+
+def explained_share(depth: Array, force: Array, line: StraightLine, spacing: int) -> float:
+    """The share of a force (N,) at depths (N,), in order of time, that a line explains, noise apart.
+
+    Noise is what changes from one sample to the next, `spacing` apart: a sixth of the squared second difference of what
+    the line leaves.  It says nothing about how straight the force is.  A force that is mostly noise tells nothing: 0.
+    """
+    left = force - line.c - line.k * depth
+    second = left[2 * spacing :] - 2.0 * left[spacing:-spacing] + left[: -2 * spacing]
+    unexplained, whole = float(np.mean(left**2)), float(np.var(force))
+    noise = min(float(np.mean(second**2)) / 6.0, unexplained) if len(second) else 0.0
+    return 1.0 - (unexplained - noise) / (whole - noise) if whole > 2.0 * noise else 0.0
 
 
 def remarks(pushes: Sequence[PalpatedPush]) -> Iterator[str]:
@@ -241,17 +257,17 @@ def remarks(pushes: Sequence[PalpatedPush]) -> Iterator[str]:
     if not touched:
         return
     yield from _units(touched)
-    falling = [(push, line.k) for push, line in touched if line.k < 0 and line.r2 > MIN_R2]
+    falling = [(push, line.k) for push, line in touched if line.k < 0 and push.explained > MIN_EXPLAINED]
     if falling:
         which, worst = _which([push for push, _ in falling], pushes), min(k for _, k in falling)
         yield (
             f"{which}: the force falls as the depth grows, by up to {-worst:.4g} N/m, which no tissue does; "
             "write sign = -1 for the channel of the depth or of the force"
         )
-    if not (best := max(line.r2 for _, line in touched)) > MIN_R2:
+    if not (best := max(push.explained for push, _ in touched)) > MIN_EXPLAINED:
         yield (
-            f"no push counts: a straight line explains at most {best:.0%} of its force, and {MIN_R2:.0%} are needed; "
-            "push slower or deeper, or check what else the force contains"
+            f"no push counts: a straight line explains at most {best:.0%} of its force beyond noise, and "
+            f"{MIN_EXPLAINED:.0%} are needed; push slower or deeper, or check what else the force contains"
         )
 
 

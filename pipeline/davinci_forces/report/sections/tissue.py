@@ -29,9 +29,9 @@ def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     yield Prose(
         "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
         "contact. Contact begins and ends at the kinks of the force-depth curve. A push is used if the line explains "
-        "90 % of its force; the stiffness of a log is the median over the used pushes. The standard error allows for "
-        "correlated residuals, for tissue that differs from place to place, and for the worst effect of the joint "
-        "model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
+        "90 % of its force beyond noise; the stiffness of a log is the median over the used pushes. The standard error "
+        "allows for correlated residuals, for tissue that differs from place to place, and for the worst effect of the "
+        "joint model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
         "without delay. The filter's estimate is not used here, because it is delayed. Samples at rest are not used, "
         "because friction can then take any value."
     )
@@ -54,7 +54,7 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        text = f"a straight line explains 90 % of the force's variance in none of {count(len(tissue), 'push')}"
+        text = f"a straight line explains 90 % of the force beyond noise in none of {count(len(tissue), 'push')}"
         return Verdict("bad", f"{name}: {text}.")
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
     law = next((model.chosen for model in context.catalogue.select(TissueModel, log=tissue.log)), "")

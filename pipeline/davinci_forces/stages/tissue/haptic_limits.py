@@ -31,7 +31,7 @@ def run(
     stiffnesses: Iterable[Stiffness], comparisons: Iterable[Comparison], fits: Iterable[Fit],
     noises: Iterable[FilterNoise], haptics: HapticScenario, robot: Robot, *, q_tau: float,
 ) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:  # fmt: skip
-    """Compute the thesis's criteria; simulate the experiment of section 8.4 on the measured tissue, and its limits."""
+    """Compute the thesis's criteria; simulate the experiment of section 8.4 on the stiffest tissue, and its limits."""
     tissues = [tissue.stiffness for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
         return
@@ -46,7 +46,7 @@ def run(
         haptics,
         bodies[0],
         noise,
-        float(np.median(tissues)),
+        max(tissues),
         q_tau or (joint.q_tau if joint else 0.0),
         tuned.delay if tuned else haptics.filter_delay,
     )

@@ -177,7 +177,7 @@ def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str
     lines = [push.line for push in pushes if push.line is not None]
     k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
     model = np.array([push.k_std_model for push in pushes])
-    counts = r2 > palpation.MIN_R2
+    counts = np.array([push.explained for push in pushes]) > palpation.MIN_EXPLAINED
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
     std = median_std(k[counts], k_std[counts], common) if counts.any() else float("nan")

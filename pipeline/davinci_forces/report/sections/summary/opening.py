@@ -99,7 +99,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
         level = stiffness_level(log, context.true_stiffness(log.log))
         stiffness, low, high = context.numbers(f"tissue.{log.log}", ("stiffness", "stiffness_q1", "stiffness_q3"))
         quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
-        why = "; a straight line explains at most 90 % of the force of the others" if log.pushes < len(log) else ""
+        why = "; a straight line explains less than 90 % of the others" if log.pushes < len(log) else ""
         used = f" ({log.pushes} of {count(len(log), 'push')}{why})"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
 
