@@ -116,6 +116,7 @@ def test_a_saved_study_gives_the_numbers_of_the_arrays_and_a_stream(identified, 
             assert_allclose(
                 fit.theta, next(made.theta for made in identified.record if made.key == fit.key), rtol=1e-12
             )
+    assert len(davinci_forces.read(folder, "Fit", group=JOINT, periods=0)) > 0  # a number selects, too
     stream = davinci_forces.stream(folder)
     assert stream.joints == (JOINT,)
     with pytest.raises(NotAFile, match="exists"):

@@ -537,6 +537,22 @@ def test_a_repeating_motion_within_another_identifies_too_where_one_that_does_no
     assert [entry.role for entry in reading.read(tmp_path).logs] == ["identification", role] + ["validation"] * tests
 
 
+@pytest.mark.parametrize(
+    ("files", "joint"), [(("slide_a", "slide_b", "probe"), True), (("slide_a", "roll", "probe"), False)]
+)
+def test_a_log_of_one_joint_whose_name_tells_none_has_that_of_the_others(tmp_path, files, joint):
+    for k, file in enumerate(files):
+        t, q, dq = motion(1, seed=k)
+        columns = {"Position (rad)": 20.0 * q, "Velocity (rad/s)": 20.0 * dq, "Current (A)": effort(q, dq)}
+        of_joint = {name: column[:, 0].tolist() for name, column in columns.items()}
+        (tmp_path / f"{file}.lvm").write_bytes(lvm([Write(of_joint, x=t.tolist())]))
+    new(tmp_path)
+    text = (tmp_path / "study.toml").read_text()
+    of_probe = next(entry for entry in reading.read(tmp_path).logs if entry.name == "probe")
+    assert (of_probe.joints == ("instrument_slide",)) == joint
+    assert ("CHECK: which joint it is: taken is that of the other logs" in text) == joint
+
+
 def test_a_role_that_values_tell_is_to_be_checked_where_another_log_moves_the_joint(tmp_path):
     for name, seed, size in (("a", 1, 1.0), ("b", 2, 0.5), ("slide_unknown", 1, 1.0)):
         t, q, dq = motion(2, seed=seed)

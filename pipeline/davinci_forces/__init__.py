@@ -59,7 +59,7 @@ def identify(
     return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings)
 
 
-def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
+def read(study: str | Path, record: str, **about: object) -> "pd.DataFrame":
     """Read all records of one kind of a study into a DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
 
     The scalars that identify a record (log, joint, ...) become columns.  `attrs["units"]` has the unit of each column,

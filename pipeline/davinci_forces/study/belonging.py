@@ -34,6 +34,7 @@ MAX_TURN = 1.6  # [rad] within which the hand turns
 DAVINCI_WORDS = ("davinci", "dvrk", "psm")
 OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
 MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way; a drive that turns farther may be in degrees
+OTHERS_JOINT = "which joint it is: taken is that of the other logs"
 UNCLEAR_JOINT = "which joint it is, as other logs are of more than one"
 HARMONICS = 12  # more than an excitation usually has: too few distort the motion, too many keep a little noise
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
@@ -72,7 +73,8 @@ def candidates(folder: Path) -> tuple[list[Arm], list[str]]:
 def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms: Sequence[Arm]) -> list[Holding]:
     """Assign the joint of each log of one joint by the name of its file and folders, where no channel tells it.
 
-    Where that does not tell it either, the joint is to be checked if other logs tell of more than one.
+    Where that does not tell it either, it is the joint that all other logs of one joint have, if they have the same.
+    It is to be checked then, and if other logs tell of more than one.
     """
     numbers = [int(found[1]) for name in names for found in JOINT_NUMBER.finditer(name)]
     robots, first = [arm.robot for arm in arms], 0 if 0 in numbers else 1
@@ -81,10 +83,17 @@ def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms
         by_file_name(holding, name, robots, first) if lone else holding
         for holding, name, lone in zip(holdings, names, untold, strict=True)
     ]
+    lost = [lone and not holding.has_named_joints for holding, lone in zip(assigned, untold, strict=True)]
+    found = {i: assigned[i] for i, lone in enumerate(untold) if lone and not lost[i]}
+    if len({(str(of.robot and of.robot.name), *{m.joint for m in of.meanings.values()}) for of in found.values()}) == 1:
+        name = names[next(iter(found))]  # its words tell the joint of the others, too
+        return [
+            by_file_name(of, name, robots, first).to_check(OTHERS_JOINT) if is_lost else of
+            for of, is_lost in zip(assigned, lost, strict=True)
+        ]
     several = any(holding.joints > 1 for holding in assigned)
     return [
-        holding.to_check(UNCLEAR_JOINT) if several and lone and not holding.has_named_joints else holding
-        for holding, lone in zip(assigned, untold, strict=True)
+        of.to_check(UNCLEAR_JOINT) if several and is_lost else of for of, is_lost in zip(assigned, lost, strict=True)
     ]
 
 

@@ -13,7 +13,7 @@ from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
 
 
-def read(study: Path, kind: str, selection: dict[str, str]) -> pd.DataFrame:
+def read(study: Path, kind: str, selection: dict[str, object]) -> pd.DataFrame:
     """All records of a kind whose fields equal those of `selection`, in one DataFrame; see `davinci_forces.read`."""
     if kind not in KINDS:
         raise BadRequest(f"there is no kind of record {kind!r}; the kinds are {', '.join(KINDS)}")
@@ -27,9 +27,9 @@ def read(study: Path, kind: str, selection: dict[str, str]) -> pd.DataFrame:
     records = [store.read(KINDS[kind], study_folders.processed, file) for file in files]
     for key, value in selection.items():
         known = sorted({str(getattr(record, key)) for record in records})
-        if known and value not in known:
+        if known and str(value) not in known:
             raise BadRequest(f"{study} has no {kind} whose {key} is {value!r}; there are {', '.join(known)}")
-        records = [record for record in records if str(getattr(record, key)) == value]
+        records = [record for record in records if str(getattr(record, key)) == str(value)]
     if not records:
         raise MissingRecord(f"{study} has no {kind} records; run `davinci-forces all {study}`")
     frame = pd.concat([as_frame(record) for record in records], ignore_index=True)
