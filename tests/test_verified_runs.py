@@ -41,7 +41,9 @@ def test_a_number_is_traced_to_the_raw_files_on_which_it_rests(finished):  # noq
     stages = [step.split()[1].rstrip(":") for step in steps if step.startswith("  by ")]
     assert stages[0] == "measure"
     assert stages.index("ekf") < stages.index("ingest")
-    raw = {step.split()[1]: step.split()[-1].rstrip(")") for step in steps if step.startswith("  from ")}
+    raw = {step.split()[1].rstrip(","): step.split()[-1].rstrip(")") for step in steps if step.startswith("  from ")}
+    assert Path(next(iter(raw))).name == "push.csv"  # the number's own log comes first
+    assert sum("for the model" in step for step in steps) == len(raw) - 1
     assert {Path(name).name for name in raw} >= {"push.csv", "roll.csv"}
     assert all(sha256(Path(name).read_bytes()).hexdigest().startswith(sha) for name, sha in raw.items())
     said = call("verify", finished, "--number", "contact.push.hand_rol.1.peak", code=1)

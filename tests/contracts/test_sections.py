@@ -62,6 +62,7 @@ from davinci_forces.report.sections import (
     noise,
     parts,
     prediction,
+    provenance,
     runs,
     summary,
     tissue,
@@ -534,6 +535,24 @@ def test_noise_that_would_hide_the_band_is_not_drawn(full: Context):
         noisy = replace(quiet, tau_ext_direct=size * np.where(k % 2, 1.0, -1.0))
         panel = runs.external_effort_panel(noisy)
         assert [mark.label for mark in panel.marks if isinstance(mark, Line)] == names
+
+
+def test_processed_files_are_counted_in_whatever_depth_of_their_kind(full: Context):
+    places = ("links/davinci.parquet", "fit/hand_roll/lse.parquet", "fit/hand_roll/wlse.parquet")
+    about = replace(full, provenance=replace(full.provenance, processed=dict.fromkeys(places, "0" * 64)))
+    [made] = [b for b in provenance.section(about).blocks if isinstance(b, OnScreen) and b.anchor == "made"]
+    counts = {row[0]: row[1] for table in made.blocks if isinstance(table, Table) for row in table.rows}
+    assert (counts["Links"], counts["Fit"]) == ("1", "2")
+    assert counts["Track"].startswith("skipped")
+
+
+def test_what_the_study_reverses_and_changes_is_listed(full: Context):
+    log = full.study.logs[0]
+    turned = replace(log, channels=tuple(replace(source, sign=-1) for source in log.channels[-2:]))
+    study = replace(full.study, logs=(turned, *full.study.logs[1:]), changed={"hand_roll": {"gear_ratio": 90.0}})
+    listed = [b.text for b in provenance.section(replace(full, study=study)).blocks if isinstance(b, Listing)]
+    assert "hand_roll: gear_ratio = 90.0" in listed
+    assert f"{log.name}: {', '.join(source.quantity for source in log.channels[-2:])}" in listed
 
 
 def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):

@@ -24,7 +24,7 @@ from davinci_forces.filters.online import (
     Window,
     delay_of,
 )
-from davinci_forces.filters.problem import filter_inputs
+from davinci_forces.filters.problem import FilterInput, filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.mechanics.kinematics import jacobian
@@ -34,7 +34,7 @@ from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.stages.forces import stream as stage
 from tests import arm
-from tests.exported import ORIGIN, export, motion, motion_of
+from tests.exported import NOISE, ORIGIN, RATE, export, motion, motion_of
 
 T_S = 0.02
 
@@ -62,6 +62,26 @@ def test_effort_and_inertia_are_those_of_the_model_with_every_term(structure):
             assert tau_hat == pytest.approx(tau[k], abs=1e-11 * np.abs(tau).max())
             M += sum(term.value * term.acceleration for term in tried.terms)
             assert pytest.approx(dynamics[row].inertia[k], rel=1e-11) == M
+
+
+@pytest.mark.parametrize("structure", ["independent", "coupled"])
+def test_a_joint_filtered_sample_by_sample_is_filtered_as_a_whole(structure):
+    exported, moved = export(DAVINCI, structure), motion(3)
+    document, N = exported.document(), int(np.flatnonzero(np.diff(moved.segment))[0]) + 1
+    links, stream = LinkTree(document["chain"], document["gravity"]), Stream(document)
+    for number, joint in enumerate(exported.joints):
+        about, of_model = document["joints"][number], motion_of(joint, moved)
+        tried = OnlineJoint(about, document["models"][about["model"]], document["coordinates"], links)
+        row = joint.model.efforts.index(joint.name)
+        tau = efforts(joint.model, joint.fit.theta, of_model)[:, row] + 0.3
+        dynamics = joint.model.joint_dynamics(joint.fit.theta, of_model)[row]
+        q, dq, ddq = (x[:, number] for x in moved[:3])
+        part = FilterInput(dynamics, q, dq, ddq, tau, 1.0 / RATE, about["filter"]["initial_std"]).part(slice(0, N))
+        expected, found = tracker("ekf")(part, NOISE).tau_ext, []
+        for k in range(N):
+            of_links, M = stream._links_effort(tried, *(x[k] for x in moved[:3]))
+            found.append(tried.step((q[k], dq[k]), (q[k], dq[k], ddq[k]), tau[k], of_links, M)[1])
+        assert_allclose(found, expected, atol=1e-9 * np.abs(tau).max())
 
 
 def test_the_force_at_the_tip_balances_the_efforts():

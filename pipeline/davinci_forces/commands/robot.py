@@ -208,7 +208,10 @@ def _joint_lines(robot: "Robot", J_v: list[list[float]]) -> Iterator[str]:
         towards = ", ".join(
             f"{x / size if abs(x) > 0.005 * size else 0.0:.2g}" for x in column if size > PRINTED_AS_ZERO
         )
-        where = f"; positive: the tip moves along ({towards})" if towards else ""
+        up = robot.chain.up if robot.chain else (0.0, 0.0, 0.0)
+        rises = sum(map(float.__mul__, column, up)) / (size or 1.0)
+        side = ", down" if rises < -0.9 else ", up" if rises > 0.9 else ""
+        where = f"; positive: the tip moves along ({towards}){side}" if towards else ""
         yield f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}{where}"
 
 

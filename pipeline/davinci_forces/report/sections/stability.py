@@ -7,12 +7,13 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stiffness
-from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line
 from davinci_forces.report.context import Context, label
 from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name, section_of
 
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
+TISSUES: tuple[Colour, ...] = ("green", "sky", "yellow")
 SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
 ROWS = (
     *((f"hand_{name}", f"{name.capitalize()} of the hand", "assumed") for name in ("mass", "damping", "stiffness")),
@@ -74,10 +75,11 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
     words = f"{'**stable** against' if stable else 'may oscillate against'} the measured tissue, {tissue}"
     if limit.k_t_limit + half < stiffest.stiffness:
         words = f"**not stable** against the measured tissue, {tissue}; a damping of {needed} is needed"
+    none = ", which cannot be told from none" if limit.k_t_limit <= half else ""
     return Verdict(
         "good" if stable else "warn",
-        f"Hand “{name}”: {words}. Feedback is stable on elastic tissue of up to {headline}. With friction of the arm "
-        f"and damping of the tissue, simulation finds {settles}.",
+        f"Hand “{name}”: {words}. Feedback is stable on elastic tissue of up to {headline}{none}. With friction of the "
+        f"arm and damping of the tissue, simulation finds {settles}.",
     )
 
 
@@ -93,8 +95,20 @@ def model(context: Context, limits: list[HandLimit]) -> str:
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
         "state the same limit: the formula takes the filter's lag and gain, from logs if there are any, at the "
         "frequency at which the hand would oscillate; the response and the simulation contain the filter itself. "
-        f"{agree}The last column of [@stability-table] says what each row includes. Try other hands: `davinci-forces "
-        "stability --help`."
+        f"{agree}The last column of [@stability-table] says what each row includes. {assumed(context)}"
+    )
+
+
+def assumed(context: Context) -> str:
+    """State what the limits assume of the device, its link and the controller, none of which a log shows."""
+    haptics = context.study.haptics
+    late = MS * (haptics.position_delay + haptics.force_delay)
+    delay = f"{late:g} ms of delay" if late else "no delay"
+    scales = f"motion is scaled by {haptics.device.motion:g} and force by {haptics.device.force:g}"
+    return (
+        f"They also assume messages at {haptics.link_rate:g} Hz with {delay} but the wait for a message, and a "
+        f"controller at {haptics.rate:g} Hz; {scales}. State others, and other hands, in a scenario: `davinci-forces "
+        "haptics --template` prints one, with all that it assumes."
     )
 
 
@@ -141,9 +155,9 @@ def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
 
 
 def tissue_lines(context: Context, tissues: list[Stiffness]) -> Iterator[HLine]:
-    """The measured tissues; in simulations of the thesis's experiments, also the tissue of the thesis."""
-    for i, tissue in enumerate(tissues):
-        yield HLine(tissue.stiffness, "" if i else "measured tissue", "green", "solid")
+    """The measured tissues by their logs; in simulations of the thesis's experiments, also the tissue of the thesis."""
+    for tissue, colour in zip(tissues, cycle(TISSUES), strict=False):
+        yield HLine(tissue.stiffness, literal(tissue.log), colour, "solid")
     if context.compares_with_thesis:
         yield HLine(THESIS_TISSUE, "thesis's tissue", "black", "dotted")
 

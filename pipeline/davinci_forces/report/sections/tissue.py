@@ -108,10 +108,11 @@ def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Fi
     last = spread_panel(tissue) if many else hysteresis_panel(typical)
     misfit = typical.force - typical.intercept - typical.k_t * typical.depth
     residual = Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(typical, misfit)))
+    why = "The stiffness of this push is nearest to that of the log." if tissue.pushes else "No push counts."
     third = "the distribution of the stiffness of pushes" if many else "its force on the way in and out (hysteresis)"
     return Figure(
         f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
-        f"residual of the line; and {third}. The stiffness of this push is nearest to that of the log.",
+        f"residual of the line; and {third}. {why}",
         f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}.",
         (line_panel(pushes, typical), residual, last),
         f"tissue-{tissue.log}",
@@ -211,8 +212,9 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
             rows.append((literal(model.log), name, *numbers, "chosen" if name == model.chosen else ""))
     if rows:
         caption = (
-            "Models of the tissue. Stiffness and damping are at half the usual depth below first contact. Friction of "
-            "a joint whose effort is the force reverses with the motion, as damping does: slow pushes do not tell them "
-            "apart, and the standard error holds only the model's usual error."
+            "Models of the tissue. Stiffness and damping are at half the median depth of the pushes below first "
+            "contact; they check the stiffness of the log, which is the one to quote. Friction of a joint whose effort "
+            "is the force reverses with the motion, as damping does: slow pushes do not tell them apart, and the "
+            "standard error holds only the model's usual error."
         )
         yield Table(caption, header, tuple(rows), "tissue-models", "llrrrrl")

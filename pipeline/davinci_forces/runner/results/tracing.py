@@ -22,7 +22,8 @@ def trace(folders: Folders, key: str) -> Iterator[str]:
     except FileNotFoundError:
         raise MissingRecord(f"{folders.raw} has no report; run `davinci-forces all {folders.raw}`") from None
     if key not in numbers:
-        near = " or ".join(get_close_matches(key, numbers, 3)) or "see results.json"
+        alike = [name for name in numbers if name.split(".")[:2] == key.split(".")[:2]] or numbers
+        near = " or ".join(get_close_matches(key, alike, 3)) or "see results.json"
         raise BadRequest(f"the report of {folders.raw} has no number {key}; did you mean {near}?")
     number = numbers[key]
     file, _, place = number["source"].partition("#")
@@ -31,18 +32,18 @@ def trace(folders: Folders, key: str) -> Iterator[str]:
     yield f"  it is {place} in {folders.file(file)} (SHA-256 {number['sha256'][:DIGITS]})"
     made = {name: entry for entry in Ledger(folders).entries() for name in entry.outputs}
     stages: dict[str, dict[str, None]] = {}
-    raw: dict[str, str] = {}
+    raw: dict[str, tuple[bool, str]] = {}  # whether the file belongs to a log that the key names, and its hash
     waiting, seen = [file], {file}
     while waiting:
         if (entry := made.get(waiting.pop(0))) is None:
             continue
         stages.setdefault(entry.stage, {})[entry.task] = None
         for name, sha in entry.fingerprint["inputs"].items():
-            raw |= {name: sha} if name.startswith("raw/") else {}
+            raw |= {name: (entry.task in key.split("."), sha)} if name.startswith("raw/") else {}
             waiting += [name] if name not in seen else []
             seen.add(name)
     for stage, tasks in stages.items():
         more = f" and {len(tasks) - MAX_TASKS} more" if len(tasks) > MAX_TASKS else ""
         yield f"  by {stage}: {', '.join([*tasks][:MAX_TASKS])}{more}"
-    for name, sha in sorted(raw.items()):
-        yield f"  from {folders.file(name)} (SHA-256 {sha[:DIGITS]})"
+    for name, (is_own, sha) in sorted(raw.items(), key=lambda item: (not item[1][0], item[0])):
+        yield f"  from {folders.file(name)}{'' if is_own else ', for the model'} (SHA-256 {sha[:DIGITS]})"
