@@ -95,11 +95,11 @@ def model(context: Context, limits: list[HandLimit]) -> str:
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
         "state the same limit: the formula takes the filter's lag and gain, from logs if there are any, at the "
         "frequency at which the hand would oscillate; the response and the simulation contain the filter itself. "
-        f"{agree}The last column of [@stability-table] says what each row includes. {assumed(context)}"
+        f"{agree}The last column of [@stability-table] says what each row includes. {assumptions(context)}"
     )
 
 
-def assumed(context: Context) -> str:
+def assumptions(context: Context) -> str:
     """State what the limits assume of the device, its link and the controller, none of which a log shows."""
     haptics = context.study.haptics
     late = MS * (haptics.position_delay + haptics.force_delay)
