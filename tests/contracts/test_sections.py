@@ -22,6 +22,7 @@ from davinci_forces.records import (
     LogSummary,
     PeriodResidual,
     Prediction,
+    Push,
     Spectrum,
     Stiffness,
     TipContact,
@@ -553,6 +554,14 @@ def test_what_the_study_reverses_and_changes_is_listed(full: Context):
     listed = [b.text for b in provenance.section(replace(full, study=study)).blocks if isinstance(b, Listing)]
     assert "hand_roll: gear_ratio = 90.0" in listed
     assert f"{log.name}: {', '.join(source.quantity for source in log.channels[-2:])}" in listed
+
+
+def test_a_loop_of_hysteresis_has_the_scale_of_the_contact(full: Context):
+    push = next(push for push in full.catalogue.records(Push) if 0 < push.inside.sum() < len(push))
+    [model] = [mark for mark in tissue.hysteresis_panel(push).marks if isinstance(mark, Line)]
+    inside = 1e3 * push.depth[push.inside == 1]
+    assert (model.x.min(), model.x.max()) == pytest.approx((inside.min(), inside.max()))
+    assert np.isfinite(model.y).all()
 
 
 def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Context):

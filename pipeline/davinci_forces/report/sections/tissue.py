@@ -138,7 +138,8 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
 
 def hysteresis_panel(push: Push) -> Panel:
     """The hysteresis of one push, with the force of the chosen model."""
-    model = Line(MM * push.depth, push.fitted, "model", "black", "solid")
+    touching = push.inside == 1  # the way to the tissue would set the scale
+    model = Line(MM * push.depth[touching], push.fitted[touching], "model", "black", "solid")
     heading = f"Hysteresis of push {push.push}"
     return Panel(heading, "depth [mm]", "force [N]", (*in_and_out(push, push.force), model))
 
