@@ -596,6 +596,9 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, ones)
     about = context(lab, without(catalogue, Contact))
     assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(about, [])
+    logs = tuple(log for log in about.study.logs if log.role != "contact")
+    only_tissue = replace(about, study=replace(about.study, logs=logs))
+    assert "No contact is measured: pushes are in [@tissue]." in summary.opening_paragraph(only_tissue, [])
 
 
 def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, catalogue: Catalogue):

@@ -22,7 +22,7 @@ from davinci_forces.runner.processes.workers import TaskQueue, WorkerPool
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
 
-MAX_REASONS = 3  # of the tasks of a step that are printed one by one
+MAX_REASONS = 1  # of the tasks of a step that are printed one by one
 
 
 @dataclass
@@ -276,7 +276,7 @@ def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
     if len(reasons) <= MAX_REASONS:
         return reasons
     every = [name for names in reasons.values() for name in names]
-    return {f"{next(iter(reasons))}; {len(reasons) - 1} more such reasons": every}
+    return {f"{next(iter(reasons))}; more such reasons: {len(reasons) - 1}": every}
 
 
 def _listed(stage: str, tasks: list[str]) -> str:

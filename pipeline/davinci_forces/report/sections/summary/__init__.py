@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Track
+from davinci_forces.records import Contact, Stiffness, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
@@ -118,8 +118,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         f"{opening.logs_in_words(context)}{opening.currents_in_words(context)}"
     )
     if not contacts:
-        contact_logs = any(log.role == "contact" for log in context.study.logs)
-        why = "none was found, and the study states none" if contact_logs else "no log has the role contact"
+        roles = {log.role for log in context.study.logs}
+        why = "pushes are in [@tissue]" if context.catalogue.records(Stiffness) else "no log has the role contact"
+        why = "none was found, and the study states none" if "contact" in roles else why
         return f"{text} No contact is measured: {why}."
     peaks = largest_peaks(context, contacts)
     if not stated:
