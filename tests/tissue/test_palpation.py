@@ -26,6 +26,7 @@ from davinci_forces.maths.tissue.tissue import (
     tangent,
 )
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
+from davinci_forces.stages.tissue import palpate
 from davinci_forces.study import WHOLE_LOG
 from tests.arm import ARM
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
@@ -92,6 +93,19 @@ def test_the_stiffness_is_the_median_slope_of_the_pushes_that_are_straight():
     assert not set(models.law) & {"Kelvin-Voigt", "Hunt-Crossley"}  # there is no velocity without a clock
     assert np.isnan(tissue.onset).all()
     assert not said
+
+
+def test_depths_of_numbered_pushes_are_distances_where_the_tip_is_known_in_space():
+    t, number = np.arange(6.0), np.array([1, 1, 1, 2, 2, 2])
+    place, force = np.array([3.0, 4.0, 0.0]) * np.array([0.0, 1.0, 2.0, 0.0, 1.0, 0.5])[:, None], np.ones((6, 1))
+    for depth, ways in (
+        (place, [[0.0, 5.0, 10.0], [0.0, 5.0, 2.5]]),
+        (place[:, :1], [[0.0, 3.0, 6.0], [0.0, 3.0, 1.5]]),
+    ):
+        data = Probing(t, number, depth, force, np.full((6, 3), np.nan), np.full(6, np.nan), np.zeros(6))
+        found = palpate.numbered_pushes(data)
+        assert [way.tolist() for way, _ in found] == ways
+        assert [size.tolist() for _, size in found] == [[1.0] * 3] * 2
 
 
 def test_noise_makes_no_push_crooked_and_a_crooked_one_stays_so():
