@@ -63,8 +63,8 @@ every-test: oracles axe
 	$(MAKE) --no-print-directory test TESTS=--slow
 
 format: $(READY_TO_CHECK) ## lay out the code, and mend what the linter can
-	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
 
 lint: $(READY_TO_CHECK) ## say where the code is not laid out or breaks a rule
 	$(BIN)/ruff format --check .
@@ -101,7 +101,7 @@ pictures: ## draw the README's pictures anew, from the report of the demonstrati
 	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/page-one
 	pdftoppm -r 65 -f 9 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
 
-clean: ## remove what was made: processed files, reports, environment
+clean: ## remove what was made: the results of every study, and the environment
 	rm -rf .venv build *.egg-info processed/* reports/*
 
 help: ## list what can be made

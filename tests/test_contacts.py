@@ -148,6 +148,16 @@ def test_an_impulse_does_not_depend_on_the_rate_or_on_where_the_window_meets_the
         assert summary.impulse == pytest.approx(impulse, rel=0.01)
 
 
+def test_the_mean_of_unevenly_spaced_samples_is_over_time():
+    """A ramp from 0 to 2 within [10, 12] s, of which the first half has ten times as many samples."""
+    t = np.concatenate([np.arange(0.0, 11.0, 0.01), np.arange(11.0, 14.0, 0.1)])
+    ramp = np.clip(t - 10.0, 0.0, 2.0)
+    found = summarise(t, (ramp, 0.0 * t, ramp), (10.0, 12.0), t < 5.0, rise=0.0)
+    assert found.mean == pytest.approx(1.0, abs=0.003)
+    late = summarise(t, (ramp, 0.0 * t, ramp), (10.0, 11.95), t < 5.0, rise=0.0)  # ends between two samples
+    assert late.mean == pytest.approx(0.975, abs=0.005)
+
+
 def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
     """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
     weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)

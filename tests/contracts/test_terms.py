@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.filters import stepping
+from davinci_forces.exports import c as exported
+from davinci_forces.exports import identified
+from davinci_forces.filters import online, stepping
 from davinci_forces.maths.models import terms
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
 from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term
+from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Z_OF_MOTION, Term
 from davinci_forces.maths.models.terms import bias as bias_of
 from davinci_forces.report.writers.typesetting import Formula, draw_formulas
 from davinci_forces.robots.robot import Kind
+from tests.conftest import ROOT
 from tests.contracts.dimensions import has_a_dimension, is_effort
 
 TERM = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)
@@ -27,6 +30,20 @@ def bias(term, q, dq) -> np.ndarray:
     """b, b_q and b_dq (3, N), as the filter's loop has them."""
     c = bias_coefficients((term,), np.ones(1))
     return np.array([stepping.bias(c, *x, 0.0) for x in zip(q.tolist(), dq.tolist(), strict=True)]).T
+
+
+def test_a_function_of_the_motion_stands_wherever_a_program_needs_it():
+    """In the analysis, in the stream, which stands alone, and in C, by their order; static ones hold a resting arm."""
+    names = list(Z_OF_MOTION)
+    assert list(online.Z_OF_MOTION) == names, "add the function to filters/online.py, too"
+    for name, function in Z_OF_MOTION.items():
+        for q, dq in ((0.3, -0.7), (-1.2, 0.4)):
+            assert online.Z_OF_MOTION[name](q, dq) == pytest.approx(float(function(q, dq)), rel=1e-12), name
+        at_rest = any(function(np.array(q), np.array(0.0)) != 0.0 for q in (0.3, 1.1))
+        assert (name in identified.STATIC) == at_rest, f"correct STATIC of exports/identified.py for {name}"
+    code = (ROOT / "pipeline/davinci_forces/exports/model.c").read_text().partition("of[] = {")[2].partition("};")[0]
+    in_c = [part for part in re.sub(r"\([^()]*\)", "", re.sub(r"\([^()]*\)", "", code)).split(",") if part.strip()]
+    assert len(in_c) == len(exported.KINDS), "add the function to `state` in exports/model.c, in the same place"
 
 
 def test_every_term_is_listed_under_its_name():

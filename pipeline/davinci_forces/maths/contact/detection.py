@@ -91,13 +91,13 @@ def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: flo
     They exceed the `level`, () or (N,).  `rise` [s] is the duration T_s that the smoother gives a step.  Two peaks of
     one sign are one contact if the effort between them stays above half of the smaller one.
     """
-    runs: list[tuple[int, int]] = []
+    stretches: list[tuple[int, int]] = []
     for start, stop in sign_runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
-        if runs and is_one_contact(tau_ext * np.sign(tau_ext[start]), *runs[-1], start, stop):
-            start = runs.pop()[0]
-        runs.append((start, stop))
+        if stretches and is_one_contact(tau_ext * np.sign(tau_ext[start]), *stretches[-1], start, stop):
+            start = stretches.pop()[0]
+        stretches.append((start, stop))
     contacts = []
-    for start, stop in runs:
+    for start, stop in stretches:
         size = tau_ext * np.sign(tau_ext[start])
         onset, release = (edge(t, size, std, start, stop, inwards, rise) for inwards in (1, -1))
         contacts.append(Event(*onset, *release))
@@ -134,7 +134,7 @@ def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int,
     lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
     apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
     duration, crossing_std = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0))), std[k] * apparent / peak
-    longer = float(np.sqrt(duration**2 + 2.0 * apparent * (2.0 * 2.0**0.5 * crossing_std)))  # T_seen = 2 (t - t)
+    longer = float(np.sqrt(duration**2 + 2.0 * apparent * (2.0 * 2.0**0.5 * crossing_std)))  # of T_seen = 2 (t_b - t_a)
     error = np.linalg.norm([crossing_std, SHAPE * duration, 0.5 * (longer - duration)])
     return middle - (0.5 + SHIFT) * inwards * duration, float(error)
 
@@ -190,7 +190,7 @@ def summarise(
     if not len(inside):
         return None
     duration, edges = end - start, np.concatenate([[start], 0.5 * (t[within][1:] + t[within][:-1]), [end]])
-    # Each sample counts for the time around it, within window and log.
+    # Each sample counts for the time around it, within window and log; a log of one sample, too.
     shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
     mean = float(np.average(direct[within], weights=shares))
     constant = 0.0 if constant_std is None else float(constant_std[within].mean())
