@@ -526,6 +526,11 @@ def test_contacts_of_several_joints_at_one_time_are_one_row(full: Context):
     assert "–" not in table.rows[0]
     assert (table.rows[1][3], table.rows[2][2]) == ("–", "–")
     assert not [*contacts_section.by_time(full, contacts[:1])]
+    long = {"onset": np.array([0.0]), "release": np.array([9.5]), "above": np.array([1]), "peak": np.array([1.0])}
+    one = replace(contacts[1], **{name: getattr(contacts[1], name)[:1] for name in contacts[1].columns()} | long)
+    twice = replace(contacts[0], peak=np.array([5.0, 2.0, 1.0]))
+    [table] = contacts_section.by_time(full, [twice, one])
+    assert [row[2] for row in table.rows] == [full.number("contact.tip.hand_roll.1.peak")]  # the largest of a joint
 
 
 def test_noise_that_would_hide_the_band_is_not_drawn(full: Context):

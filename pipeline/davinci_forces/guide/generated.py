@@ -47,12 +47,10 @@ def python() -> str:
         public = {
             name: member for name, member in vars(kind).items() if not name.startswith("_") and inspect.getdoc(member)
         }
-        values = {name: member for name, member in public.items() if isinstance(member, property)}
-        blocks += (
-            ["\n".join(f"- `{name}`: {first_sentence(inspect.getdoc(of))}" for name, of in values.items())]
-            if values
-            else []
-        )
+        values = [
+            f"- `{name}`: {first_sentence(of.__doc__)}" for name, of in public.items() if isinstance(of, property)
+        ]
+        blocks += ["\n".join(values)] * bool(values)
         for name, member in public.items():
             if inspect.isfunction(member):
                 blocks += document_function(f"{kind.__name__}.{name}", member, level=3)

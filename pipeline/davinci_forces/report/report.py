@@ -82,19 +82,11 @@ def answer(context: Context) -> str:
         message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
         return "\n".join([message, *measured]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
-    contacts = (
-        [f"contacts, {peaks[1].lower()}{peaks[2:]}"]
-        if (peaks := largest_peaks(context, context.catalogue.records(Contact)))
-        else []
-    )
+    peaks = largest_peaks(context, context.catalogue.records(Contact)).removeprefix(" Largest")
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
-    lines = [
-        *align([HEADER, *rows]),
-        LEGEND,
-        *(["look at these first:", *looks] if looks else []),
-        *contacts,
-        *measured,
-    ]
+    if looks:
+        looks = ["look at these first:", *looks]
+    lines = [*align([HEADER, *rows]), LEGEND, *looks, *[f"contacts, largest{peaks}"] * bool(peaks), *measured]
     return "\n".join(lines) + "\n"
 
 

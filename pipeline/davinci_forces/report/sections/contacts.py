@@ -72,17 +72,18 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
     joints = context.joints_of([contact for of in touching.values() for contact in of])
     rows = []
     for log, of in touching.items():
-        windows = sorted((c.onset[i], c.release[i], c.joint, i) for c in of for i in np.flatnonzero(c.above).tolist())
-        groups: list[list[tuple[float, float, str, int]]] = []
-        for window in windows:
+        groups: list[list[tuple[float, float, float, str, int]]] = []
+        above = [(c, i) for c in of for i in np.flatnonzero(c.above).tolist()]
+        for window in sorted((c.onset[i], c.release[i], abs(c.peak[i]), c.joint, i) for c, i in above):
             if groups and window[0] < max(end for _, end, *_ in groups[-1]):
                 groups[-1].append(window)
             else:
                 groups.append([window])
         for group in groups:
             first, last = min(start for start, *_ in group), max(end for _, end, *_ in group)
-            touched = {joint: f"contact.{log}.{joint}.{i + 1}.peak" for _, _, joint, i in group}
-            peaks = (context.number(touched[joint]) if joint in touched else "–" for joint in joints)
+            largest_last = sorted(group, key=lambda window: window[2])
+            keys = {joint: f"contact.{log}.{joint}.{i + 1}.peak" for *_, joint, i in largest_last}
+            peaks = (context.number(keys[joint]) if joint in keys else "–" for joint in joints)
             rows.append((literal(log), f"{first:.1f} to {last:.1f} s", *peaks))
     if rows:
         caption = (

@@ -103,14 +103,10 @@ def looks_at_reach(context: Context, joints: list[str]) -> Iterator[tuple[float,
         ("outside", verdicts.MAX_OUTSIDE, "{:.0%} of its samples are beyond all fitted positions", "goes as far"),
     )
     for name, most, text, remedy in reaches:
-        found, share = max(
-            ((np.nan_to_num(getattr(of, name)), of) for of in shares), key=lambda x: x[0], default=(0, None)
-        )
-        if share is not None and found > most:
+        share = max(shares, key=lambda of: np.nan_to_num(getattr(of, name)), default=None)
+        if share is not None and (found := getattr(share, name)) > most:
             where, what = f"**{title(share.joint)}, {literal(share.log)}**", text.format(found).replace("%", " %")
-            follows = (
-                f"so its model extrapolates, and errors may be larger. Record an identification log that {remedy}."
-            )
+            follows = f"so its model extrapolates and may err more. Record an identification log that {remedy}."
             yield found / most, f"{where}: {what}, {follows}"
 
 
@@ -142,9 +138,9 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
         text += "study.toml, `fit = 'independent.consistent'`."
         if LIFTED_MASS in wrong:
             text = (
-                "its lifted mass is negative. Unless a counterweight lifts it, its positive direction, and with it the "
+                "its lifted mass is negative. Unless a counterweight lifts it, its positive direction and the sign of "
             )
-            text += f"sign of its efforts, is not that of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
+            text += f"its efforts are not those of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
         yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
