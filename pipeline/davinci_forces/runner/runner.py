@@ -272,11 +272,12 @@ def _brief(reasons: list[str]) -> str:
 
 
 def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
-    """Reasons with their tasks; many reasons become one, which states the first."""
+    """Reasons with their tasks; many become one, which states the first that is not what an earlier stage made."""
     if len(reasons) <= MAX_REASONS:
         return reasons
     every = [name for names in reasons.values() for name in names]
-    return {f"{next(iter(reasons))}; more such reasons: {len(reasons) - 1}": every}
+    first = min(reasons, key=lambda reason: reason.startswith("processed/"))
+    return {f"{first}; more such reasons: {len(reasons) - 1}": every}
 
 
 def _listed(stage: str, tasks: list[str]) -> str:
