@@ -1,6 +1,5 @@
 """Identify a robot, and estimate its external efforts, from arrays: the stages run on a study in a temporary folder."""
 
-import json
 import shutil
 import tempfile
 import warnings
@@ -30,7 +29,7 @@ from davinci_forces.runner.runs import folders
 from davinci_forces.study import LogEntry, Settings, Study
 from davinci_forces.study.entries import entries_of
 from davinci_forces.study.reading import settings_of
-from davinci_forces.toml import TomlFile, TomlTable
+from davinci_forces.toml import TomlFile, TomlTable, in_toml
 
 IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
 NEW = "new"  # the log that is predicted, or whose external effort is estimated
@@ -67,9 +66,7 @@ def identify(
     ]
     if problems:
         raise BadRequest("\n".join(problems))
-    identified = IdentifiedArm(arm, used, moved, columns, periods)
-    identified.given = robot, dict(settings or {})
-    return identified
+    return IdentifiedArm(arm, used, moved, columns, periods, (robot, dict(settings or {})))
 
 
 def refuse(table: TomlTable) -> None:
@@ -127,13 +124,12 @@ class IdentifiedArm:
     it, for a report, a stream or an export.
     """
 
-    given: tuple[Any, dict[str, Any]]  # robot and settings as `identify` got them
-
     def __init__(
         self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
-        periods: Sequence[float | None],
+        periods: Sequence[float | None], arguments: tuple[str | Path | Robot, dict[str, Any]],
     ) -> None:  # fmt: skip
         self.robot, self.joints = robot, tuple(joints)
+        self._arguments = arguments  # robot and settings as `identify` got them
         home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
         folder = home / "raw" / "arrays"
@@ -214,7 +210,7 @@ class IdentifiedArm:
         BadRequest
             If the robot was given as an object, of which there is no file.
         """
-        target, (robot, settings) = Path(folder), self.given
+        target, (robot, settings) = Path(folder), self._arguments
         if isinstance(robot, Robot):
             raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
         lines = ['title = "From arrays"', f"robot = {in_toml(Path(robot).name)}", "simulated = false"]
@@ -354,13 +350,6 @@ class ExternalEffort:
 
     def _repr_html_(self) -> str:
         return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)
-
-
-def in_toml(value: Any) -> str:
-    """A text, number, truth value, list or table of them as TOML."""
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{in_toml(str(key))} = {in_toml(of)}' for key, of in value.items())} }}"
-    return json.dumps(value, ensure_ascii=False)
 
 
 def by_joint(columns: Mapping[str, tuple[Array, Array]]) -> pd.DataFrame:

@@ -28,3 +28,9 @@ def records(columns: Any) -> NDArray[np.void]:
     for name, column in zip(columns._fields, columns, strict=True):
         table[name] = column
     return table
+
+
+def runs(which: Booleans) -> list[slice]:
+    """The runs of true samples (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)
+    return [slice(start, stop) for start, stop in edges.tolist()]

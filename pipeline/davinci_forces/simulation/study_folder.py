@@ -1,6 +1,5 @@
 """Write simulated studies: logs, study.toml and truth.toml, which are moved into place when all are complete."""
 
-import json
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +15,7 @@ from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, simulate_log, theta
 from davinci_forces.simulation.scenario import Scenario, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
+from davinci_forces.toml import in_toml
 
 STUDY, TRUTH = "study.toml", "truth.toml"
 
@@ -98,7 +98,7 @@ def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) ->
 
 def study_text(scenario: Scenario) -> str:
     """The text of study.toml, which does not depend on the samples."""
-    head = f"title = {toml(scenario.title)}\nrobot = {toml(scenario.robot.name)}\nsimulated = true\n"
+    head = f"title = {in_toml(scenario.title)}\nrobot = {in_toml(scenario.robot.name)}\nsimulated = true\n"
     head += f"\n[settings]\nharmonics = {scenario.harmonics}\n" if scenario.harmonics else ""
     entries = (study_entry(scenario, log) for log in scenario.logs)
     return "# Written by `davinci-forces simulate`: simulated data.\n" + "\n".join([head, *entries])
@@ -108,35 +108,30 @@ def study_entry(scenario: Scenario, log: SimulatedLog) -> str:
     """The [[log]] of one recording in study.toml."""
     path, t = Path(log.file), np.zeros(2)
     at_rest = SimulatedRun(t, {name: SimulatedMotion(t, t, t, t) for name in log.joints}, np.zeros((2, 3)))
-    lines = ["[[log]]", f"name = {toml(log.name)}", f"file = {toml(log.file)}", f"role = {toml(log.role)}"]
+    lines = ["[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(log.file)}", f"role = {in_toml(log.role)}"]
     periods = {move.period for move in log.moves.values() if isinstance(move, Fourier)}
     if len(periods) == 1 and log.role in ("identification", "validation"):
-        lines.append(f"period = {toml(periods.pop())}")
+        lines.append(f"period = {in_toml(periods.pop())}")
     if log.skip:
-        lines.append(f"skip = {toml(log.skip)}")
+        lines.append(f"skip = {in_toml(log.skip)}")
     if log.windows:
-        lines.append(f"contact = {toml([list(window) for window in log.windows])}")
+        lines.append(f"contact = {in_toml([list(window) for window in log.windows])}")
     if log.role == "weight":
-        lines.append(f"weight = {{ mass = {toml(log.mass)} }}")
+        lines.append(f"weight = {{ mass = {in_toml(log.mass)} }}")
     lines.append("[log.channels]")
     for channel in record_channels(scenario, log, at_rest):
-        name = toml(sensors.channel_name(path, channel))
+        name = in_toml(sensors.channel_name(path, channel))
         if channel.quantity == "time":
             lines.append(f"time = {name}")
         else:
-            lines.append(f"{toml(channel.quantity)} = {{ channel = {name}, unit = {toml(channel.unit)} }}")
+            lines.append(f"{in_toml(channel.quantity)} = {{ channel = {name}, unit = {in_toml(channel.unit)} }}")
     return "\n".join(lines) + "\n"
-
-
-def toml(value: object) -> str:
-    """Write a text, a number, a truth value or a list as TOML; for these, JSON has the same form."""
-    return json.dumps(value, ensure_ascii=False)
 
 
 def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
     """The text of truth.toml: what was put into each joint, for each family if there are any; then the logs."""
     lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
-    lines += [f"scenario = {toml(scenario.name)}", f"seed = {scenario.seed}"]
+    lines += [f"scenario = {in_toml(scenario.name)}", f"seed = {scenario.seed}"]
     lines += [f"clock_jitter = {scenario.clock_jitter}"] * (scenario.clock_jitter > 0.0)
     if scenario.arm is None:
         lines += _theta("theta", scenario, {name: np.array(j.theta) for name, j in scenario.joints.items()})
@@ -156,18 +151,18 @@ def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
 
 def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
     """The [[log]] of one recording in truth.toml: its pushes, its mass, and its times of contact."""
-    lines = ["[[log]]", f"name = {toml(log.name)}", f"role = {toml(log.role)}"]
-    lines += [f"{key} = {toml(value)}" for key, value in (("family", log.family), ("mass", log.mass)) if value]
+    lines = ["[[log]]", f"name = {in_toml(log.name)}", f"role = {in_toml(log.role)}"]
+    lines += [f"{key} = {in_toml(value)}" for key, value in (("family", log.family), ("mass", log.mass)) if value]
     if log.sensor:
-        lines.append(f"sensor = {{ noise = {toml(log.sensor.noise)}, lag = {toml(log.sensor.lag)} }}")
+        lines.append(f"sensor = {{ noise = {in_toml(log.sensor.noise)}, lag = {in_toml(log.sensor.lag)} }}")
     if log.tissue:
-        lines += [f"stiffness = {toml(log.tissue.stiffness)}", f"surface = {toml(log.tissue.surface)}"]
-        lines.append(f"touched = {toml(contact_times(run))}")
+        lines += [f"stiffness = {in_toml(log.tissue.stiffness)}", f"surface = {in_toml(log.tissue.surface)}"]
+        lines.append(f"touched = {in_toml(contact_times(run))}")
     for joint, pushes in log.external.items():
         for push in pushes:
-            lines += ["", "[[log.push]]", f"joint = {toml(joint)}", *_push(push)]
+            lines += ["", "[[log.push]]", f"joint = {in_toml(joint)}", *_push(push)]
     for push in log.tip:
-        lines += ["", "[[log.push]]", f"direction = {toml(push.direction)}", *_push(push)]
+        lines += ["", "[[log.push]]", f"direction = {in_toml(push.direction)}", *_push(push)]
     return "\n".join(lines) + "\n"
 
 
@@ -181,13 +176,13 @@ def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.floa
     for name, values in parameters.items():
         terms = scenario.robot.joint(name).terms
         lines += ["", f"[{place}.{name}]"]
-        lines += [f"{toml(t.name)} = {toml(p)}" for t, p in zip(terms, values.tolist(), strict=True)]
+        lines += [f"{in_toml(t.name)} = {in_toml(p)}" for t, p in zip(terms, values.tolist(), strict=True)]
     return lines
 
 
 def _table(place: str, values: Mapping[str, object]) -> list[str]:
-    return ["", f"[{place}]", *(f"{key} = {toml(value)}" for key, value in values.items())]
+    return ["", f"[{place}]", *(f"{key} = {in_toml(value)}" for key, value in values.items())]
 
 
 def _push(push: SimulatedPush) -> list[str]:
-    return [f"{key} = {toml(getattr(push, key))}" for key in ("shape", "start", "end", "peak")]
+    return [f"{key} = {in_toml(getattr(push, key))}" for key in ("shape", "start", "end", "peak")]

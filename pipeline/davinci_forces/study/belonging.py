@@ -83,18 +83,25 @@ def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms
         by_file_name(holding, name, robots, first) if lone else holding
         for holding, name, lone in zip(holdings, names, untold, strict=True)
     ]
-    lost = [lone and not holding.has_named_joints for holding, lone in zip(assigned, untold, strict=True)]
-    found = {i: assigned[i] for i, lone in enumerate(untold) if lone and not lost[i]}
-    if len({(str(of.robot and of.robot.name), *{m.joint for m in of.meanings.values()}) for of in found.values()}) == 1:
-        name = names[next(iter(found))]  # its words tell the joint of the others, too
+    unnamed = [lone and not holding.has_named_joints for holding, lone in zip(assigned, untold, strict=True)]
+    by_name = [i for i, lone in enumerate(untold) if lone and not unnamed[i]]
+    if len({_robot_and_joints(assigned[i]) for i in by_name}) == 1:
+        name = names[by_name[0]]  # its words tell the joint of the others, too
         return [
-            by_file_name(of, name, robots, first).to_check(OTHERS_JOINT) if is_lost else of
-            for of, is_lost in zip(assigned, lost, strict=True)
+            by_file_name(of, name, robots, first).to_check(OTHERS_JOINT) if is_unnamed else of
+            for of, is_unnamed in zip(assigned, unnamed, strict=True)
         ]
     several = any(holding.joints > 1 for holding in assigned)
     return [
-        of.to_check(UNCLEAR_JOINT) if several and is_lost else of for of, is_lost in zip(assigned, lost, strict=True)
+        of.to_check(UNCLEAR_JOINT) if several and is_unnamed else of
+        for of, is_unnamed in zip(assigned, unnamed, strict=True)
     ]
+
+
+def _robot_and_joints(holding: Holding) -> tuple[str, frozenset[int]]:
+    """The robot of which a log is known to be, or "", and its joints."""
+    robot = holding.robot.name if holding.robot else ""
+    return robot, frozenset(meaning.joint for meaning in holding.meanings.values())
 
 
 def arm_of(

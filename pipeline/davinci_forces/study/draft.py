@@ -17,9 +17,10 @@ from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import force_sensor, is_tissue, tissue_channels
 from davinci_forces.study.entries import is_inside
 from davinci_forces.study.guessing import Holding, guess
-from davinci_forces.study.log_table import DraftLog, LogTable, Row, as_string, paths_in
+from davinci_forces.study.log_table import DraftLog, LogTable, Row, paths_in
 from davinci_forces.study.names import is_time
 from davinci_forces.study.roles import Evidence, roles_of
+from davinci_forces.toml import in_toml
 
 NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
 
@@ -163,8 +164,8 @@ def _named_as(robot: Robot, drawn: Sequence[DraftLog]) -> list[DraftLog]:
 def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     robot = arm.robot
     reason = f"; {arm.reason}" if arm.reason else ""
-    yield f"title = {as_string(folder.resolve().name)}"
-    yield f"robot = {as_string(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
+    yield f"title = {in_toml(folder.resolve().name)}"
+    yield f"robot = {in_toml(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
     yield "simulated = false"
     if robot.tool:
         why = "of the tool's shaft: CHECK, forces at the tip depend on it"

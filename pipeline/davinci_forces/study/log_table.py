@@ -1,6 +1,5 @@
 """Write the [[log]] table of one log of a draft, and its row of the table that `new` prints."""
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from davinci_forces.study.guessing import Holding, Meaning
 from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.roles import Role
 from davinci_forces.study.timing import samples_of
+from davinci_forces.toml import in_toml
 
 # Of joints: two units, and the farthest that a drive goes in both; beyond the second, a position is in counts.
 UNKNOWN_UNITS = {
@@ -78,12 +78,12 @@ class LogTable:
 
     def lines(self) -> list[str]:
         """The lines of the [[log]]; all of them comments if nothing in the log can be used."""
-        paths = [as_string(path) for path in paths_in(self.draft.files, self.folder)]
+        paths = [in_toml(path) for path in paths_in(self.draft.files, self.folder)]
         join = f"join = [{', '.join(paths)}]  # one signal per file"
         period = "# period = 10.0  # [s] estimated from the data; a given value is checked"
         block = [
             "[[log]]",
-            f"name = {as_string(self.name)}",
+            f"name = {in_toml(self.name)}",
             f"file = {paths[0]}" if len(paths) == 1 else join,
             *self._role(),
             *([] if self.draft.touching else [period]),
@@ -147,7 +147,7 @@ class LogTable:
             elsewhere = 'moves_with = "<joint>", position = [x, y, z], in m from the remote centre'
             yield f"{mass} CHECK: at the tip; elsewhere also {elsewhere}"
             if self.tare:
-                yield f"tare = {as_string(self.tare)}  # the run without the mass, to be subtracted"
+                yield f"tare = {in_toml(self.tare)}  # the run without the mass, to be subtracted"
 
     def _rate(self) -> Iterator[str]:
         timing, tissue = self.draft.guess.timing, bool(self.draft.touching)
@@ -213,32 +213,30 @@ class LogTable:
             elif channel.name == timing.time:
                 yield _time_line(channel, timing.size, timing.reason)
             elif channel.name == log.time:
-                yield f"time = {as_string(channel.name)}  # the log's own"
+                yield f"time = {in_toml(channel.name)}  # the log's own"
             elif is_time(channel):
                 why = "the log has its own clock" if log.clock else "a time that is not used"
-                yield f"# time = {as_string(channel.name)}  # {why}"
+                yield f"# time = {in_toml(channel.name)}  # {why}"
             else:
                 symbol = without_joint.get(channel.name, "")
                 notes = ["MISSING: the joint"] * bool(symbol) + [f"in {channel.unit}"] * bool(channel.unit)
                 notes += [f"{channel.alias}, no joint of {self.robot.name}"] * ("[" in channel.alias)
                 comment = f"  # {'; '.join(notes)}" if notes else ""
-                yield f'# "<joint>.{symbol or "<quantity>"}" = {as_string(channel.name)}{comment}'
+                yield f'# "<joint>.{symbol or "<quantity>"}" = {in_toml(channel.name)}{comment}'
 
     def _meaning_line(self, channel: Channel, meaning: Meaning, unknown: str) -> str:
         """The line of a joint's channel; commented out where the joint does not move or is unknown."""
         if meaning.joint >= len(self.robot.joints):
             count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
-            return f'# "<joint>.{meaning.symbol}" = {as_string(channel.name)}  # {count}'
+            return f'# "<joint>.{meaning.symbol}" = {in_toml(channel.name)}  # {count}'
         joint, holding = self.robot.joints[meaning.joint], self.draft.guess
         stated = stated_unit(channel)
         unit = _fitting(meaning, joint, hides_unit=stated != channel.unit)
-        value = (
-            f"{{ channel = {as_string(channel.name)}, unit = {as_string(unit)} }}" if unit else as_string(channel.name)
-        )
+        value = f"{{ channel = {in_toml(channel.name)}, unit = {in_toml(unit)} }}" if unit else in_toml(channel.name)
         note = f"in {stated}" if stated else f"in {unit}" if unit else "no unit: SI"
         if unknown:
-            value, note = f'{{ channel = {as_string(channel.name)}, unit = "" }}', f"MISSING: {unknown}"
-        line = f"{as_string(f'{joint.name}.{meaning.symbol}')} = {value}"
+            value, note = f'{{ channel = {in_toml(channel.name)}, unit = "" }}', f"MISSING: {unknown}"
+        line = f"{in_toml(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
             if meaning.joint not in holding.joints_of_ranges():
                 return f"# {line}  # CHECK: no position of the joint"
@@ -262,9 +260,9 @@ def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
 def _time_line(channel: Channel, size: float, reason: str) -> str:
     """The line of a channel of times, with its unit where the log does not state one that is known."""
     if measures(canonical(channel.unit)) == "time" or size == 1.0:
-        return f"time = {as_string(channel.name)}  # {reason}"
+        return f"time = {in_toml(channel.name)}  # {reason}"
     unit = ', unit = "ms"' if size == 1e-3 else f', scale = {size!r}, unit = "s"'
-    return f"time = {{ channel = {as_string(channel.name)}{unit} }}  # {reason}"
+    return f"time = {{ channel = {in_toml(channel.name)}{unit} }}  # {reason}"
 
 
 def paths_in(files: Sequence[Path], folder: Path) -> list[str]:
@@ -300,15 +298,10 @@ def _in_millimetres(log: Log, touching: dict[str, str]) -> set[str]:
 
 def _touch_line(channel: Channel, quantity: str, in_millimetres: bool) -> str:
     if quantity == "push":
-        return f"push = {as_string(channel.name)}  # number of the push"
+        return f"push = {in_toml(channel.name)}  # number of the push"
     unit = unit_of(channel, quantity)
     if in_millimetres:
-        return f'{quantity} = {{ channel = {as_string(channel.name)}, unit = "mm" }}  # unit by the size of its values'
+        return f'{quantity} = {{ channel = {in_toml(channel.name)}, unit = "mm" }}  # unit by the size of its values'
     where = "" if channel.unit else "  # unit by its name" if unit else "  # the log gives no unit: CHECK THIS"
     unit = unit or SI[OF_THE_LOG[quantity]]
-    return f"{quantity} = {{ channel = {as_string(channel.name)}, unit = {as_string(unit)} }}{where}"
-
-
-def as_string(value: str) -> str:
-    """A text as a string of TOML."""
-    return json.dumps(value, ensure_ascii=False)
+    return f"{quantity} = {{ channel = {in_toml(channel.name)}, unit = {in_toml(unit)} }}{where}"

@@ -63,12 +63,10 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     for i in rest:
         if chosen[i].role != "identification" and (reason := _unlike(recordings[i].holding, reference)):
             touched[i] = reason
-    given = [i for i, role in enumerate(roles) if role is not None]
+    moving = {i: {*recordings[i].holding.moving} for i, role in enumerate(roles) if role is not None or i in rest}
     for i in rest:  # what values say is a guess where another log of the joint may have that role
-        same = [
-            k for k in (*rest, *given) if k != i and {*recordings[k].holding.moving} & {*recordings[i].holding.moving}
-        ]
-        if same and '"' not in chosen[i].reason:
+        has_others = any(moving[i] & joints for k, joints in moving.items() if k != i)
+        if has_others and '"' not in chosen[i].reason:
             chosen[i] = chosen[i]._replace(reason=f"{GUESSED}{chosen[i].reason}")
     named = [role or (Role("contact", touched[i]) if i in touched else chosen[i]) for i, role in enumerate(roles)]
     return _with_tares(recordings, _with_identification(recordings, named))

@@ -9,9 +9,9 @@ from davinci_forces.filters import DEFAULT, tracker
 from davinci_forces.filters.innovations import coloured
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.tuning import likeliest_walk
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array, Booleans, runs
 from davinci_forces.maths.signals.whiteness import tests
-from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient, runs
+from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient
 
 LEVEL = 0.01  # probability below which a test rejects white noise
 LAGS = 20  # number of lags of the Ljung-Box statistic

@@ -33,9 +33,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array, Booleans, runs
 from davinci_forces.maths.contact.unexplained import SIGMA
-from davinci_forces.maths.signals.windows import runs
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 HALF = 0.5  # of what is rounded off a triangle, which a peak loses on average, with an error as large

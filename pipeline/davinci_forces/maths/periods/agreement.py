@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers, runs
 from davinci_forces.maths.periods.averaging import Phases, end, nearest, phases, whole_periods
 from davinci_forces.maths.periods.harmonics import Harmonics
 from davinci_forces.maths.periods.period import refine, standard_error
-from davinci_forces.maths.signals.windows import runs
 
 MIN_ODD_RATIO = 2.0  # of a difference to what noise explains: dropping a period costs more than a smaller one
 NEGLIGIBLE_DIFFERENCE = 1e-4  # share of a signal's standard deviation: encoder steps cause smaller ones

@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, runs
 from davinci_forces.maths.periods.harmonics import amplitudes, last_above
-from davinci_forces.maths.signals.windows import runs
 
 POINTS = 1024  # a search reduces a recording to this number of points, each the mean of neighbouring samples
 MIN_PERIOD_POINTS = 4  # a period of fewer points is not searched

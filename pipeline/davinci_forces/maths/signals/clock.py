@@ -10,8 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
-from davinci_forces.maths.signals.windows import runs
+from davinci_forces.maths.arrays import Array, Booleans, Integers, runs
 
 GAP = 2.5  # sampling times: a longer interval is an interruption, unless at most `FILLED` is missing
 MISSING = 1.5  # sampling times: a longer interval lacks a sample

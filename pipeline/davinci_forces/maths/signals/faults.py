@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks
+from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks, runs
 from davinci_forces.maths.signals.clock import GAP
-from davinci_forces.maths.signals.windows import runs
 
 MIN_TIME_STUCK = 0.25  # [s] shortest time at one value before a jump
 MIN_JUMP_RATIO = 5.0  # of a jump to the largest usual step between samples

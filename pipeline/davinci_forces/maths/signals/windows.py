@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers, runs
 from davinci_forces.maths.signals.smoothing import segments
 
 UNSCORED_STRETCH, UNSCORED_SAMPLE = 1, 2  # flags of samples that are not scored: with their transients, or alone
@@ -48,12 +48,6 @@ def free_smoothed(
 def spans(t: Array, which: Booleans) -> list[tuple[float, float]]:
     """The first and the last time [s] of each run of true samples (N,), at times t (N,)."""
     return [(float(t[run.start]), float(t[run.stop - 1])) for run in runs(which)]
-
-
-def runs(which: Booleans) -> list[slice]:
-    """The runs of true samples (N,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)
-    return [slice(start, stop) for start, stop in edges.tolist()]
 
 
 def longest_run(t: Array, rate: float) -> slice:

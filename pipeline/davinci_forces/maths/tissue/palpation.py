@@ -217,8 +217,8 @@ def _pushed(
     probing: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float
 ) -> PalpatedPush:
     (depth, force), speed = way, probing.speed[part]
-    usual = float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE))
-    counted = moves(speed, usual, int(np.ceil(rate / (2 * cutoff))))
+    usual, spacing = float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE)), int(np.ceil(rate / (2 * cutoff)))
+    counted = moves(speed, usual, spacing)
     contact = indentation.all_of(depth, counted) if stated else indentation.find_contact(depth, force, counted)
     d_rate = np.zeros(len(depth))
     if rate and len(depth) > 1:
@@ -232,8 +232,7 @@ def _pushed(
     ways = (inside & loading, inside & ~loading)
     loaded, unloaded = (indentation.slope_with_std(depth[way], force[way], common) for way in ways)
     place, t = probing.place[part], probing.t[part]
-    spacing = max(int(np.ceil(rate / (2 * cutoff))), 1)
-    explained = explained_share(depth[inside], force[inside], line, spacing) if line else float("nan")
+    explained = explained_share(depth[inside], force[inside], line, max(spacing, 1)) if line else float("nan")
     return PalpatedPush(number, t, depth, force, d_rate, place, contact, line, *loaded, *unloaded, error, explained)
 
 
@@ -243,9 +242,9 @@ def explained_share(depth: Array, force: Array, line: StraightLine, spacing: int
     Noise is what changes from one sample to the next, `spacing` apart: a sixth of the squared second difference of what
     the line leaves.  It says nothing about how straight the force is.  A force that is mostly noise tells nothing: 0.
     """
-    left = force - line.c - line.k * depth
-    second = left[2 * spacing :] - 2.0 * left[spacing:-spacing] + left[: -2 * spacing]
-    unexplained, whole = float(np.mean(left**2)), float(np.var(force))
+    residual = force - line.c - line.k * depth
+    second = residual[2 * spacing :] - 2.0 * residual[spacing:-spacing] + residual[: -2 * spacing]
+    unexplained, whole = float(np.mean(residual**2)), float(np.var(force))
     noise = min(float(np.mean(second**2)) / 6.0, unexplained) if len(second) else 0.0
     return 1.0 - (unexplained - noise) / (whole - noise) if whole > 2.0 * noise else 0.0
 

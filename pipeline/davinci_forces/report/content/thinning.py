@@ -1,4 +1,4 @@
-"""Thinning marks of many samples, without hiding an extreme, and finding stretches of samples."""
+"""Thinning marks of many samples, without hiding an extreme."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,16 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from davinci_forces.maths.arrays import Array, Booleans, row_blocks
+from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.report.content.marks import AnyMark, Band, Line, Points, Stems
 
 Indices = NDArray[np.intp]
-
-
-def stretches(which: Booleans) -> list[slice]:
-    """The stretches of samples (N,) at which something holds."""
-    edges = np.flatnonzero(np.diff(np.r_[0, which.astype(np.int8), 0])).reshape(-1, 2)
-    return [slice(start, end) for start, end in edges.tolist()]
 
 
 def thin_mark(mark: AnyMark, limit: int) -> AnyMark:

@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content.thinning import stretches
+from davinci_forces.maths.arrays import Array, runs
 
 POINT = 72 / 25.4  # points in a millimetre
 LONG = 200  # points of a path whose steps are in tenths of a point, not hundredths
@@ -19,7 +18,7 @@ def trace(x: Array, y: Array, closed: bool = False) -> str:
     """The path through points [pt], interrupted where one is not finite, in relative steps."""
     scale = 10 if len(x) > LONG else 100
     ends = "z" if closed else ""
-    return "".join(_run(x[run], y[run], scale) + ends for run in stretches(np.isfinite(x) & np.isfinite(y)))
+    return "".join(_run(x[run], y[run], scale) + ends for run in runs(np.isfinite(x) & np.isfinite(y)))
 
 
 def _run(x: Array, y: Array, scale: int) -> str:

@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, runs
 from davinci_forces.records import HapticResponse, HapticRun
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
 from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine, VSpan
-from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
 
@@ -80,7 +79,7 @@ def traces(context: Context, run: HapticRun) -> Figure:
 
 def spans(run: HapticRun) -> Iterator[AnyMark]:
     """The contacts of a run."""
-    for i, touched in enumerate(stretches(run.true_force > 0.0)):
+    for i, touched in enumerate(runs(run.true_force > 0.0)):
         yield VSpan(float(run.t[touched.start]), float(run.t[min(touched.stop, len(run) - 1)]), "" if i else "contact")
 
 

@@ -1,6 +1,7 @@
 """Records and results as pandas DataFrames, for further analysis."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import pandas as pd
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.files import read_bytes
 from davinci_forces.records import KINDS, Record, store
-from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.ledger import Folders, Ledger
 from davinci_forces.runner.runs import folders
+
+FIELDS = ("key", "value", "std", "unit", "source", "sha256")  # of a number in results.json
 
 
 def read(study: Path, kind: str, selection: dict[str, object]) -> pd.DataFrame:
@@ -41,18 +44,27 @@ def read(study: Path, kind: str, selection: dict[str, object]) -> pd.DataFrame:
 
 def results(study: Path) -> pd.DataFrame:
     """All numbers of a study's results.json; see `davinci_forces.results`."""
-    file = folders(study, None, None).reports / "results.json"
-    names = ["key", "value", "std", "unit", "source"]
-    try:
-        numbers = json.loads(read_bytes(file))
-        rows = [[*(number[name] for name in names), number.get("std_reason")] for number in numbers]
-    except FileNotFoundError:
-        raise MissingRecord(f"{file} does not exist; run `davinci-forces all {study}`") from None
-    except (ValueError, TypeError, LookupError) as error:
-        advice = f"`davinci-forces report {study}` writes it again"
-        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {advice}") from None
-    frame = pd.DataFrame(rows, columns=[*names, "std_reason"]).set_index("key")
+    numbers = numbers_of(folders(study, None, None))
+    frame = pd.DataFrame([*numbers.values()], columns=[*FIELDS[:-1], "std_reason"]).set_index("key")
     return frame.astype({"value": float, "std": float})
+
+
+def numbers_of(places: Folders) -> dict[str, Mapping[str, Any]]:
+    """The numbers of results.json by key, each with the `FIELDS`, and with the reason for an error that is missing.
+
+    Raises MissingRecord if there is no results.json, or if it is damaged.
+    """
+    file = places.reports / "results.json"
+    try:
+        rows = json.loads(read_bytes(file))
+        return {
+            row["key"]: {name: row[name] for name in FIELDS} | {"std_reason": row.get("std_reason")} for row in rows
+        }
+    except FileNotFoundError:
+        raise MissingRecord(f"{file} does not exist; run `davinci-forces all {places.raw}`") from None
+    except (ValueError, TypeError, LookupError) as error:
+        advice = f"`davinci-forces report {places.raw}` writes it again"
+        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {advice}") from None
 
 
 def as_frame(record: Record) -> pd.DataFrame:

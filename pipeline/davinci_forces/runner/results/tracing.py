@@ -1,12 +1,11 @@
 """The way from a number of the report back to the raw files on which it rests."""
 
-import json
 from collections.abc import Iterator
 from difflib import get_close_matches
 
-from davinci_forces.errors import BadRequest, MissingRecord
-from davinci_forces.files import read_bytes
+from davinci_forces.errors import BadRequest
 from davinci_forces.runner.ledger import Folders, Ledger
+from davinci_forces.runner.results.dataframes import numbers_of
 
 MAX_TASKS = 3  # of a stage in one line
 DIGITS = 16  # of a hash, as the report prints them
@@ -17,10 +16,7 @@ def trace(folders: Folders, key: str) -> Iterator[str]:
 
     Raises BadRequest if there is no such number; MissingRecord if the study has no report.
     """
-    try:
-        numbers = {number["key"]: number for number in json.loads(read_bytes(folders.reports / "results.json"))}
-    except FileNotFoundError:
-        raise MissingRecord(f"{folders.raw} has no report; run `davinci-forces all {folders.raw}`") from None
+    numbers = numbers_of(folders)
     if key not in numbers:
         alike = [name for name in numbers if name.split(".")[:2] == key.split(".")[:2]] or numbers
         near = " or ".join(get_close_matches(key, alike, 3)) or "see results.json"

@@ -9,8 +9,8 @@ from davinci_forces.filters import DEFAULT, FILTERS, filter_parts
 from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel, Recording, filter_inputs
 from davinci_forces.filters.response import DURATION, half_sine, noise_model, response
 from davinci_forces.identification.joint_models import FALLBACK, Identified, LogModels
-from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.windows import free_space, runs
+from davinci_forces.maths.arrays import Array, Booleans, runs
+from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic
 from davinci_forces.robots.robot import Kind, Robot

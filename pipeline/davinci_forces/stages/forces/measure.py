@@ -120,9 +120,8 @@ def contacts(
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
-            peak = max(
-                summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak)
-            )  # flattened, if short: its error stays
+            # A short peak is flattened below the mean; its error stays.
+            peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))
             above = clear and bool(is_above[~is_outside(track.t, [window])].any())
             measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *impulse)
             rows.append((stated, event is not None, above, *measured))

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
-from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.arrays import Booleans, runs
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
 from davinci_forces.maths.signals import smoothing
 from davinci_forces.maths.signals.clock import are_gaps, are_missing, longest_bridge
 from davinci_forces.maths.signals.faults import count_saturated, find_stuck
 from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
-from davinci_forces.maths.signals.windows import runs
 from davinci_forces.records import Column, Counts, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint, Kind
 

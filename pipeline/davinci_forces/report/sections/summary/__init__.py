@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from davinci_forces.maths.arrays import runs
 from davinci_forces.records import Contact, Stiffness, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
-from davinci_forces.report.content.thinning import stretches
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
 from davinci_forces.report.sections.summary import opening
@@ -120,7 +120,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     if not contacts:
         roles = {log.role for log in context.study.logs}
         why = "pushes are in [@tissue]" if context.catalogue.records(Stiffness) else "no log has the role contact"
-        why = "none was found, and the study states none" if "contact" in roles else why
+        if "contact" in roles:
+            why = "none was found, and the study states none"
         return f"{text} No contact is measured: {why}."
     peaks = largest_peaks(context, contacts)
     if not stated:
@@ -183,7 +184,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
         still = [
             VSpan(float(track.t[part][0]), float(track.t[part][-1]), "" if i else "at rest: not judged", REST)
-            for i, part in enumerate(stretches(track.standing > 0))
+            for i, part in enumerate(runs(track.standing > 0))
         ]
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"

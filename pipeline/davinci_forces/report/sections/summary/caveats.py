@@ -104,10 +104,10 @@ def looks_at_reach(context: Context, joints: list[str]) -> Iterator[tuple[float,
     )
     for name, most, text, remedy in reaches:
         share = max(shares, key=lambda of: np.nan_to_num(getattr(of, name)), default=None)
-        if share is not None and (found := getattr(share, name)) > most:
-            where, what = f"**{title(share.joint)}, {literal(share.log)}**", text.format(found).replace("%", " %")
+        if share is not None and (reach := getattr(share, name)) > most:
+            where, what = f"**{title(share.joint)}, {literal(share.log)}**", text.format(reach).replace("%", " %")
             follows = f"so its model extrapolates and may err more. Record an identification log that {remedy}."
-            yield found / most, f"{where}: {what}, {follows}"
+            yield reach / most, f"{where}: {what}, {follows}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
@@ -117,8 +117,10 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         error, constant = context.results[f"{p.prefix}.model_error"].number(2), ""
         if is_mostly_constant(p):
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
-            left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
-            constant = f"; {left} without its constant part, {mean}, as of another payload or an offset of the current"
+            varying = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
+            constant = (
+                f"; {varying} without its constant part, {mean}, as of another payload or an offset of the current"
+            )
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
         text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}; "
         text += f"that of a good model is at most {percent(verdicts.GOOD)}."
@@ -137,10 +139,8 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
         text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
         text += "study.toml, `fit = 'independent.consistent'`."
         if LIFTED_MASS in wrong:
-            text = (
-                "its lifted mass is negative. Unless a counterweight lifts it, its positive direction and the sign of "
-            )
-            text += f"its efforts are not those of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
+            text = "its lifted mass is negative. Unless a counterweight lifts it, its positive direction and the sign "
+            text += f"of its efforts are not those of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
         yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
