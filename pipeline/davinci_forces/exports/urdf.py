@@ -109,7 +109,7 @@ def completed_arm(robot: Robot, fit: Fit) -> IdentifiedArm:
     length = np.array([1.0 if robot.joints[row].kind is Kind.PRISMATIC else LENGTH for row in model.rows])
     price = PREFERENCE / np.r_[length**2, GRAVITY * length, GRAVITY * length]  # of `ADDED`
     guess = robot.bodies.parameters(model.chain.n) if robot.bodies else None
-    x = complete(fit.theta, model.mechanism, np.r_[price, np.ones(len(fit.theta) - base)], guess)
+    x = complete(fit.theta, fit.theta_std, model.mechanism, np.r_[price, np.ones(len(fit.theta) - base)], guess)
     inertial = x[:L].reshape(-1, 10)
     inertial = inertial * (inertial[:, :1] > NEGLIGIBLE_MASS)
     drives = [ModelTerm(name, term) for term in DRIVE for name in model.efforts]

@@ -30,6 +30,7 @@ AT_BOUND = 1e-8  # a value nearer to its bound than this share of the effort is 
 TOLERANCE = 1e-12  # of the solver's gaps and residuals
 MAX_STEP_FRACTION = 0.9  # a longer step towards the edge of a cone lets rounding stop the solver early
 MAX_GAP_SOLVER = 1e-8  # duality gap, as a share of the effort's square
+MAX_MISS = 0.01  # of a parameter by the mechanism that has it, in standard errors
 MIN_THICKNESS = 1e-9  # smallest eigenvalue of J over its largest: simulators refuse a body without any inertia
 LENGTH = 0.1  # [m] size of the links of an arm for surgery, which compares moments of inertia with masses
 
@@ -167,14 +168,14 @@ def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
 
 
-def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | None) -> Array:
-    """Find a mechanism x (n,) that has these parameters: nearest to guessed links (10 L,), or of the least mass.
+def complete(theta: Array, std: Array, mechanism: Mechanism, price: Array, guess: Array | None) -> Array:
+    """Find a mechanism x (n,) with these parameters (p,): nearest to guessed links (10 L,), or of the least mass.
 
     minimise |z - z_guess|^2, or the traces of all J, plus |price x|^2 of what is not a link,    A x = theta
 
     z are the entries of every J in kg and `LENGTH`; `price` (n - 10 L,) makes x comparable with them.
 
-    Raises NotIdentifiable if the solver does not converge.
+    Raises NotIdentifiable if a parameter is missed by more than `MAX_MISS` of its standard error `std`, if it has one.
     """
     import clarabel
 
@@ -192,9 +193,10 @@ def complete(theta: Array, mechanism: Mechanism, price: Array, guess: Array | No
     squares = diags_array(2.0 * (~links | (guess is not None)), format="csc")
     cost, right = trace * 1.0 if guess is None else -2.0 * z_guess, np.r_[theta / size, np.zeros(len(bounded))]
     z = np.array(clarabel.DefaultSolver(squares, cost, rows, right, kinds, settings(TOLERANCE)).solve().x)
-    miss = float(np.abs(F @ z - theta).max() / np.abs(theta).max())
-    if not miss < MAX_GAP_SOLVER:
-        why = f"no links were found that have these parameters: they miss them by {miss:.1e}"
+    allowed = np.fmax(MAX_GAP_SOLVER * np.abs(theta).max(), MAX_MISS * std)
+    miss = float((np.abs(F @ z - theta) / allowed).max())
+    if not miss <= 1.0:
+        why = f"no links were found that have these parameters: they miss them by {miss:.1e} of what rounding allows"
         raise NotIdentifiable(f"{why}; make joints that no log moves `fixed` in the robot's URDF, or move them")
     x = B @ np.where(mechanism.positive & ~links, np.maximum(z, 0.0), z)
     J = pseudo_inertias(x[links].reshape(L, TEN)) / np.outer(scale, scale)
