@@ -62,7 +62,6 @@ from davinci_forces.report.sections import (
     joints,
     noise,
     parts,
-    prediction,
     provenance,
     runs,
     summary,
@@ -77,7 +76,7 @@ from davinci_forces.report.sections import (
 from davinci_forces.report.sections import (
     weight as weight_section,
 )
-from davinci_forces.report.sections.joints.estimators import correlations
+from davinci_forces.report.sections.joints.details import correlations
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import caveats, opening
 from davinci_forces.report.verdicts import Trust
@@ -543,15 +542,6 @@ def test_noise_that_would_hide_the_band_is_not_drawn(full: Context):
         assert [mark.label for mark in panel.marks if isinstance(mark, Line)] == names
 
 
-def test_processed_files_are_counted_in_whatever_depth_of_their_kind(full: Context):
-    places = ("links/davinci.parquet", "fit/hand_roll/lse.parquet", "fit/hand_roll/wlse.parquet")
-    about = replace(full, provenance=replace(full.provenance, processed=dict.fromkeys(places, "0" * 64)))
-    [made] = [b for b in provenance.section(about).blocks if isinstance(b, OnScreen) and b.anchor == "made"]
-    counts = {row[0]: row[1] for table in made.blocks if isinstance(table, Table) for row in table.rows}
-    assert (counts["Links"], counts["Fit"]) == ("1", "2")
-    assert counts["Track"].startswith("skipped")
-
-
 def test_what_the_study_reverses_and_changes_is_listed(full: Context):
     log = full.study.logs[0]
     turned = replace(log, channels=tuple(replace(source, sign=-1) for source in log.channels[-2:]))
@@ -576,17 +566,6 @@ def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Con
     assert [panel.title for panel in contacts_section.peaks(full, contacts).panels] == order
     levels = contacts_section.alarm_levels(full, contacts)
     assert sorted(order, key=lambda joint: levels.index(joint.lower())) == order
-
-
-def test_scores_of_logs_whose_contacts_are_not_stated_are_said_to_hold_them(full: Context):
-    predictions = full.catalogue.records(Prediction)
-    assert "Contacts" not in prediction.every_score(full, predictions).caption
-    logs = tuple(replace(log, contact=(), free=()) if log.role == "contact" else log for log in full.study.logs)
-    unknown = replace(full, study=replace(full.study, logs=logs))
-    touched = dict.fromkeys(p.log for p in predictions if p.role == "contact")
-    assert touched
-    caption = prediction.every_score(unknown, predictions).caption
-    assert caption.endswith(f"Contacts that the study does not state are in those of {', '.join(touched)}.")
 
 
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):

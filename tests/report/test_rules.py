@@ -18,8 +18,7 @@ from davinci_forces.records import (
     Whiteness,
 )
 from davinci_forces.report.sections.innovations import over_time
-from davinci_forces.report.sections.joints.friction import curves
-from davinci_forces.report.sections.joints.friction import in_words as friction_in_words
+from davinci_forces.report.sections.joints.details import friction_curves, friction_in_words
 from davinci_forces.report.sections.joints.residuals import in_words, motion_panel
 from davinci_forces.report.sections.noise import by_period, histogram, outliers
 from davinci_forces.report.sections.parts import autocorrelation, normal_plot
@@ -89,7 +88,7 @@ def friction(model: str) -> FrictionMap:
 
 @pytest.mark.parametrize(("model", "lines"), [("independent", 2), ("chosen", 4)])
 def test_friction_has_a_curve_a_direction_and_one_of_each_branch_where_it_has_a_memory(model, lines):
-    drawn = [*curves(friction(model))]
+    drawn = [*friction_curves(friction(model))]
     assert len(drawn) == lines
     assert [bool(line.label) for line in drawn] == [True] + [False] * (lines - 1)
     assert all(np.all(np.sign(line.x) == np.sign(line.x[0])) and np.all(np.diff(line.x) >= 0) for line in drawn)

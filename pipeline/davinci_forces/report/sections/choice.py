@@ -1,23 +1,20 @@
-"""The choice of the arm's model among all candidates, and its error on data that no fit had seen."""
+"""The choice of the arm's model among all candidates."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Choice, ModelSearch, Prediction
-from davinci_forces.records.prediction import CHOSEN, SAME_PATH
+from davinci_forces.records import Choice, ModelSearch
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import paper_or_screen, run_cells, section_of
-
-MAX_RUNS_ON_PAPER = 9
+from davinci_forces.report.sections.parts import section_of
 
 
 @section_of("Choice of the model", "choice", Choice)
 def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
-    """The choice with its scores, and its error on unseen logs."""
+    """The choice with its scores."""
     choice = choices[0]
     yield Prose(
         "A candidate model has a structure: `independent` (each joint by itself) or `coupled` (through the arm's "
@@ -50,7 +47,6 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
     order = np.argsort(choice.score, kind="stable").tolist()
     every = table(context, choice, order, "Every candidate, the best first.", "candidates-table")
     yield OnScreen("Every candidate", "all-candidates", (every,))
-    yield from unseen(context)
 
 
 def search_tables(context: Context) -> Iterator[Block]:
@@ -116,19 +112,3 @@ def figure(choice: Choice) -> Figure:
         label="choice-figure",
         height=46,
     )
-
-
-def unseen(context: Context) -> Iterator[Block]:
-    """The chosen model compared with each joint by itself, on logs that were not fitted."""
-    predictions = [p for p in context.catalogue.select(Prediction, model=CHOSEN) if p.role != "identification"]
-    if not predictions:
-        return
-    rows = []
-    for p in predictions:
-        keys = p.prefix, f"predict.{p.log}.{p.joint}.independent.lse"
-        errors = (context.number(f"{key}.relative_error", 3) for key in keys)
-        rows.append((*run_cells(p), "fitted" if p.path == SAME_PATH else "new", *errors))
-    header = ("Log", "Joint", "Path", "Chosen", "Plain model")
-    caption = "Relative error on logs that were not fitted. Plain model: each joint alone, by least squares."
-    table = Table(caption, header, tuple(rows), "choice-unseen", "lllrr")
-    yield from paper_or_screen(table, "The chosen and the plain model, run by run", MAX_RUNS_ON_PAPER)

@@ -11,12 +11,11 @@ from davinci_forces.report.content.marks import AnyMark, HBand, Line
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
 
-UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the correlation
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact or reversals",
     "mended": "white once tested causes are removed",
-    UNEXPLAINED: "not white even with all tested causes removed",
+    "unexplained": "not white even with all tested causes removed",
 }
 PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
@@ -42,16 +41,11 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
     drawn = sorted((e for e in explained if (e.joint, e.log) in worst), key=lambda e: least_probability(e)[0])
-    figures = [figure(context, e, whole=True) for e in drawn]
+    figures = [figure(context, e) for e in drawn]
     yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
-    others = []
-    for e in explained:
-        seen = () if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False),)
-        others.append(OnScreen(run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (*seen, trials(e))))
-    yield OnScreen(
-        f"Innovations of {count(len(others), 'run')}, and the tested causes", "innovation-runs", tuple(others)
-    )
+    causes = tuple(OnScreen(run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (trials(e),)) for e in explained)
+    yield OnScreen(f"The tested causes in {count(len(causes), 'run')}", "innovation-runs", causes)
 
 
 def summary(explained: list[Explanation]) -> str:
@@ -118,32 +112,25 @@ def least_probability(e: Explanation) -> Column:
     return np.asarray(np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0))
 
 
-def figure(context: Context, e: Explanation, whole: bool) -> Figure:
-    """Autocorrelation, cumulative periodogram, correlation with the motion; over time, if `whole`.  Fig 7.9-7.11"""
+def figure(context: Context, e: Explanation) -> Figure:
+    """Innovations over time, autocorrelation, cumulative periodogram, correlation with the motion.  Fig 7.9-7.11"""
     name, about = run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
     white = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.select(Innovation, **about)}
-    tracks = context.catalogue.select(Track, **about) if whole else []
-    more = INNOVATION_FIELDS if whole else ()
-    rows = [
-        *(tuple(over_time(t, field, of) for field, of in INNOVATION_FIELDS) for t in tracks),
-        tuple(
-            autocorrelation(white[field], f"ACF, {of}", named=field == INNOVATION_FIELDS[0][0])
-            for field, of in INNOVATION_FIELDS
-            if field in white
-        ),
-        tuple(periodogram(white[field], of) for field, of in more if field in white),
-        tuple(with_motion(moved[field], of) for field, of in more if field in moved),
-    ]
+    tested = [(white[field], of) for field, of in INNOVATION_FIELDS if field in white]
+    panels = (
+        *(over_time(t, *signal) for t in context.catalogue.select(Track, **about) for signal in INNOVATION_FIELDS),
+        *(autocorrelation(w, f"ACF, {of}", named=w is tested[0][0]) for w, of in tested),
+        *(periodogram(w, of) for w, of in tested),
+        *(with_motion(moved[field], of) for field, of in INNOVATION_FIELDS if field in moved),
+    )
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
     return Figure(
         f"{name}, the worst run of this joint: innovations, their autocorrelation, their cumulative periodogram "
         "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "
-        "95 % (grey) and 99 % (blue)."
-        if whole
-        else f"{name}: autocorrelation of the innovations.",
+        "95 % (grey) and 99 % (blue).",
         f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
-        tuple(panel for row in rows for panel in row),
+        panels,
         f"innovations-{e.log}-{e.joint}",
         columns=2,
         height=30,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections import parts
@@ -74,9 +74,6 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
     caption = "Scores of the raw effort, and the relative error of the low-passed effort."
-    logs = dict.fromkeys(p.log for p in predictions)
-    if touched := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
-        caption += f" Contacts that the study does not state are in those of {', '.join(touched)}."
     return Table(caption, header, rows, "scores-table", "lllrrrrrr")
 
 

@@ -1,10 +1,9 @@
 """Where the numbers come from: files and their hashes, versions, settings."""
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from davinci_forces.records import KINDS, LogSummary
+from davinci_forces.records import LogSummary
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
@@ -41,14 +40,6 @@ def section(context: Context) -> Iterator[Block]:
     if turned := [f"{log.name}: {', '.join(names)}" for log in study.logs if (names := reversed_channels(log))]:
         yield Prose("Quantities whose sign the study reverses (`sign = -1`):")
         yield Listing("\n".join(turned))
-    if provenance.processed:
-        name = f"The {len(provenance.processed)} processed files by kind of record; kinds without input data"
-        folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
-        counts = tuple(
-            (kind, str(folders[record.folder()] or "skipped: no input for it")) for kind, record in KINDS.items()
-        )
-        caption = "Kinds of record, and the number of processed files of each kind."
-        yield OnScreen(name, "made", (Table(caption, ("Record", "Files"), counts),))
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)

@@ -1,4 +1,4 @@
-"""Masses on the arm: their estimates, the scale of the efforts, and apparent masses in free motion.  Section 7.5"""
+"""Masses on the arm: their estimates, and the scale of the efforts.  Section 7.5"""
 
 import math
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import FreeWeight, Load, TorqueConstant, Weight
+from davinci_forces.records import Load, TorqueConstant, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
@@ -108,9 +108,6 @@ def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     if loads := [load for load in loads if load.joint in weight.loaded]:
         yield figure(weight, loads)
     yield by_joint(context, weight)
-    free = context.catalogue.select(FreeWeight, weight=weight.log)
-    if free:
-        yield OnScreen("Apparent mass in free motion", f"free-{weight.log}", (free_motion(context, weight, free),))
 
 
 def verdict(context: Context, weight: Weight) -> Verdict:
@@ -194,14 +191,3 @@ def by_joint(context: Context, weight: Weight) -> Table:
     )
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")
     return Table(caption, header, rows, f"weight-joints-{weight.log}", "lrrrrrr")
-
-
-def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Table:
-    """The apparent mass in free motion, one row a log."""
-    rows = [(literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free]
-    caption = (
-        f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
-        "logs are predicted by fits without these logs. Apparent masses beyond their errors widen all standard "
-        f"errors, here by the factor {context.number(f'weight.{weight.log}.widening', 3)}."
-    )
-    return Table(caption, ("Log", "Role", "Mass"), rows, f"weight-free-{weight.log}", "llr")

@@ -13,8 +13,7 @@ from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.joints.estimators import convergence, correlations, estimators
-from davinci_forces.report.sections.joints.friction import friction_maps
+from davinci_forces.report.sections.joints.details import convergence, correlations, friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, of_free_motion, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
@@ -199,10 +198,8 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
     diagnostics = context.catalogue.select(Diagnostic, stage="fit", subject=group)
     remarks = tuple(literal(text.replace("`", "")) for diagnostic in diagnostics for text in diagnostic.text)
-    first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
     more = (
         *([Bullets(remarks)] if remarks else []),
-        *estimators(context, first),
         *convergence(context, group),
         *correlations(context, group),
         *friction_maps(context, group),

@@ -1,0 +1,115 @@
+"""What describes the fits of a joint on screen: correlations of parameters, the swarm's search, and friction maps."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import FrictionMap, Identifiability, SwarmSearch
+from davinci_forces.report.content import Block, Figure, Panel, Prose
+from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
+from davinci_forces.report.context import Context, label, name_in_sentence, title
+
+REACHED = 1e-6  # relative excess of the squared error, below which the least error is reached
+WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
+MAX_PANELS = 6  # friction maps in a figure
+BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
+
+
+def convergence(context: Context, joint: str) -> Iterator[Figure]:
+    """The smallest squared error of each swarm, over iterations.  Fig 6.14"""
+    searches = context.catalogue.select(SwarmSearch, group=joint)
+    if not searches:
+        return
+    ends = " and ".join(f"with {s.walls} walls it {excess_in_words(s.excess)}" for s in searches)
+    lines = tuple(
+        Line(np.arange(1.0, len(s) + 1.0), s.best_mse, f"{s.walls} walls", WALLS.get(s.walls, "")) for s in searches
+    )
+    unit = label(searches[0], "best_mse", "mean squared error")
+    yield Figure(
+        f"{title(joint)}: the least mean squared error of the swarm after each iteration, of "
+        f"{searches[0].searched} parameters by {searches[0].particles} particles. The least error that the known signs "
+        f"allow: {ends}.",
+        f"Squared error over iterations, falling until it stays: {ends}.",
+        (Panel("", "iteration", unit, lines, x_log=True, y_log=True),),
+        f"swarm-{joint}",
+        height=42,
+    )
+
+
+def excess_in_words(excess: float) -> str:
+    """State the error of a search over the least possible one."""
+    if excess < REACHED:
+        return "is reached"
+    return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
+
+
+def correlations(context: Context, joint: str) -> Iterator[Block]:
+    """The correlation matrix of a joint's parameters, and the condition number of their regressor."""
+    for record in context.catalogue.select(Identifiability, group=joint):
+        names = tuple(dict.fromkeys(map(str, record.parameter)))
+        number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
+        yield Prose(
+            f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
+            "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
+            "difference of the two parameters is known well."
+        )
+        pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
+        strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
+        numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
+        yield Figure(
+            f"{title(joint)}: correlation of the errors of its parameters (least squares).",
+            f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
+            (Panel("", "", "", (Tiles(record.correlation, numbered),)),),
+            f"correlation-{joint}",
+            height=12.0 + 9.0 * len(names),
+        )
+
+
+def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
+    """The effort minus a fit's other terms, over velocity, one panel a log and model."""
+    maps = [m for m in context.catalogue.select(FrictionMap, joint=joint) if len(m)]
+    if not maps:
+        return
+    shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:MAX_PANELS]
+    more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
+    yield Figure(
+        f"{title(joint)}: friction (the effort minus all other terms of the model) over velocity, while the joint "
+        "gains speed and while it loses speed, and the model's friction. Points are means in bins of "
+        "velocity, bars their standard deviations. If the two branches differ, friction depends on the past, or "
+        f"changes more slowly than the sign of the velocity.{more}",
+        f"Friction over velocity of {name_in_sentence(joint)}: {friction_in_words(shown[0])}",
+        tuple(friction_panel(m) for m in shown),
+        f"friction-{joint}",
+        columns=2 if len(shown) > 1 else 1,
+        height=48,
+    )
+
+
+def friction_panel(m: FrictionMap) -> Panel:
+    """One map."""
+    branches = [(m.gaining == gaining, name, colour) for gaining, name, colour in BRANCHES]
+    marks = [
+        Points(m.dq[branch], m.tau_friction[branch], name, colour, y_std=m.tau_friction_std[branch])
+        for branch, name, colour in branches
+        if branch.any()
+    ]
+    velocity, friction = label(m, "dq", "velocity"), label(m, "tau_friction", "friction")
+    return Panel(f"{m.log} ({m.model})", velocity, friction, (*marks, *friction_curves(m)))
+
+
+def friction_curves(m: FrictionMap) -> Iterator[Line]:
+    """The model's friction: one curve for both branches if it has no memory, else one curve for each."""
+    branches = [np.flatnonzero(m.gaining == gaining) for gaining in (1, 0)]
+    for rows in branches if m.model != "independent" else [np.arange(len(m))]:
+        ordered = rows[np.argsort(m.dq[rows], kind="stable")]
+        for side in (m.dq[ordered] < 0, m.dq[ordered] > 0):
+            part = ordered[side]
+            if len(part):
+                is_first = part[0] == ordered[0] and (rows is branches[0] or m.model == "independent")
+                yield Line(m.dq[part], m.tau_friction_hat[part], "model" if is_first else "", "black", "solid")
+
+
+def friction_in_words(m: FrictionMap) -> str:
+    """State the mean friction in either direction."""
+    sides = [float(m.tau_friction[side].mean()) if side.any() else 0.0 for side in (m.dq < 0, m.dq > 0)]
+    return f"{sides[0]:.2g} on average backwards and {sides[1]:.2g} forwards."
