@@ -1,17 +1,17 @@
-"""Pictures of what swarms and friction maps found."""
+"""Pictures of what estimators, swarms and friction maps found."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from davinci_forces.records import FrictionMap, Origin, SwarmSearch
+from davinci_forces.records import Fit, FrictionMap, Origin, Residual, SwarmSearch
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
-from davinci_forces.report.sections.joints.details import convergence, friction_maps
+from davinci_forces.report.sections.joints.details import convergence, estimators, friction_maps
 from davinci_forces.robots import davinci
 from davinci_forces.stages.model import fit
 from tests import arm
@@ -34,12 +34,38 @@ def context(records) -> Context:
     return Context(catalogue, study, collect(catalogue), None)
 
 
+def plain(records) -> Fit:
+    return next(r for r in records if isinstance(r, Fit) and r.estimator == "lse")
+
+
 def test_a_guess_that_rounding_leaves_of_nothing_is_nothing():
     made = fit.run([trajectory(arm.signal("instrument_slide"))], [], davinci.ROBOT, lowpass=17.0)
     results = context(list(made)).results
     assert results["guess.instrument_slide.inertia"].value == 0.0
     prior, lse = (results[f"fit.instrument_slide.independent.{name}.mse"].value for name in ("prior", "lse"))
     assert prior < 1.1 * lse
+
+
+def test_estimators_are_drawn_over_the_averaged_effort_and_as_differences(records):
+    (figure,) = estimators(context(records), plain(records))
+    over, less = figure.panels
+    assert over.marks[0].label == "measured"
+    assert {mark.label for mark in over.marks[1:]} == {"LSE", "WLSE", "PSO"}
+    assert {mark.label for mark in less.marks} == {"WLSE", "PSO"}
+    by_name = {r.estimator: r for r in records if isinstance(r, Residual)}
+    shown = next(mark for mark in less.marks if mark.label == "WLSE")
+    np.testing.assert_array_equal(shown.y, by_name["wlse"].tau_hat - by_name["lse"].tau_hat)
+    assert figure.caption.endswith("consistent and TLS are the same as least squares.")
+
+
+def test_an_estimator_that_differs_from_least_squares_is_drawn_and_one_that_does_not_is_named(records):
+    other = [
+        replace(r, tau_hat=1.1 * r.tau_hat) if isinstance(r, Residual) and r.estimator == "consistent" else r
+        for r in records
+    ]
+    (figure,) = estimators(context(other), plain(other))
+    assert "consistent" in {mark.label for mark in figure.panels[1].marks}
+    assert figure.caption.endswith("TLS is the same as least squares.")
 
 
 def test_a_search_is_drawn_as_it_fell_and_said_to_reach_what_it_reached(records):

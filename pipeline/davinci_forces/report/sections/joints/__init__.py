@@ -13,7 +13,7 @@ from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.joints.details import convergence, correlations, friction_maps
+from davinci_forces.report.sections.joints.details import convergence, correlations, estimators, friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import is_of_link, of_free_motion, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
@@ -200,6 +200,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     remarks = tuple(literal(text.replace("`", "")) for diagnostic in diagnostics for text in diagnostic.text)
     more = (
         *([Bullets(remarks)] if remarks else []),
+        *estimators(context, next((fit for fit in fits if fit.estimator == "lse"), fits[0])),
         *convergence(context, group),
         *correlations(context, group),
         *friction_maps(context, group),

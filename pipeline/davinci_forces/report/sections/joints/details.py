@@ -1,18 +1,55 @@
-"""What describes the fits of a joint on screen: correlations of parameters, the swarm's search, and friction maps."""
+"""What describes the fits of a joint on screen: estimators, correlations of parameters, the swarm, and friction maps."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import FrictionMap, Identifiability, SwarmSearch
-from davinci_forces.report.content import Block, Figure, Panel, Prose
+from davinci_forces.records import Fit, FrictionMap, Identifiability, Residual, SwarmSearch
+from davinci_forces.report.content import Block, Figure, Panel, Prose, literal
 from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
-from davinci_forces.report.context import Context, label, name_in_sentence, title
+from davinci_forces.report.context import Context, estimator_name, label, name_in_sentence, title
 
+LOOKS: dict[str, Colour] = dict(lse="vermillion", wlse="blue", pso="green", consistent="purple", tls="orange")
+MEANT_TO_DIFFER = ("consistent", "tls")  # drawn only if they differ from least squares
+ALIKE = 1e-3  # difference over the effort's standard deviation, below which two efforts are drawn as one
 REACHED = 1e-6  # relative excess of the squared error, below which the least error is reached
 WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
 MAX_PANELS = 6  # friction maps in a figure
 BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
+
+
+def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
+    """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
+    all_residuals = context.catalogue.select(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
+    residuals = {residual.estimator: residual for residual in all_residuals if residual.estimator in LOOKS}
+    if "lse" not in residuals or len(residuals) < 2:
+        return
+    plain = residuals["lse"]
+    apart = {name: float(abs(r.tau_hat - plain.tau_hat).max()) for name, r in residuals.items()}
+    same = [name for name in MEANT_TO_DIFFER if name in apart and apart[name] < ALIKE * plain.tau.std()]
+    residuals = {name: r for name, r in residuals.items() if name not in same}
+    others = {name: r for name, r in residuals.items() if name != "lse"}
+    if not others:
+        return
+    effort = label(plain, "tau", "effort")
+    name = f"{title(fit.group)} in {literal(plain.log)}"
+    named = ", ".join(map(estimator_name, residuals))
+    largest, verb = max(apart[name] for name in others), "is" if len(same) == 1 else "are"
+    alike = f" {' and '.join(map(estimator_name, same))} {verb} the same as least squares." if same else ""
+    models = (Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items())
+    differences = (Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items())
+    yield Figure(
+        f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares.{alike}",
+        f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
+        (
+            Panel("Averaged effort and models", "time [s]", effort,
+                  (Line(plain.t, plain.tau, "measured", "sky"), *models)),
+            Panel("Difference from least squares", "time [s]", effort, tuple(differences)),
+        ),
+        f"estimators-{fit.group}",
+        columns=2,
+        height=46,
+    )  # fmt: skip
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
