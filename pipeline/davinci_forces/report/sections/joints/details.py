@@ -1,4 +1,4 @@
-"""What describes the fits of a joint on screen: estimators, correlations of parameters, the swarm, and friction maps."""
+"""What describes the fits of a joint on screen: estimators, correlations, the swarm's search, and friction maps."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,9 @@ from davinci_forces.report.content import Block, Figure, Panel, Prose, literal
 from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
 from davinci_forces.report.context import Context, estimator_name, label, name_in_sentence, title
 
-LOOKS: dict[str, Colour] = dict(lse="vermillion", wlse="blue", pso="green", consistent="purple", tls="orange")
+LOOKS: dict[str, Colour] = {
+    "lse": "vermillion", "wlse": "blue", "pso": "green", "consistent": "purple", "tls": "orange",
+}  # fmt: skip
 MEANT_TO_DIFFER = ("consistent", "tls")  # drawn only if they differ from least squares
 ALIKE = 1e-3  # difference over the effort's standard deviation, below which two efforts are drawn as one
 REACHED = 1e-6  # relative excess of the squared error, below which the least error is reached
