@@ -54,7 +54,7 @@ def test_nothing_that_is_said_of_the_joint_is_in_units_of_a_push(in_current):
 @pytest.mark.medium
 def test_the_report_says_that_no_torque_constant_is_known(in_current):
     page = (in_current.parent.parent / "reports" / "arm" / "report.html").read_text()
-    assert "No torque constant of the hand roll is known" in page
+    assert "motor current [A] where the torque constant is unknown" in page
     assert "external effort [A]" in page
 
 

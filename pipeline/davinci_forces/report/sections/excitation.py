@@ -22,27 +22,24 @@ def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
         "limits: the harmonics are scaled until they reach a limit; the mean may lie anywhere in the remaining range."
         + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
     )
-    objectives, coefficients, names = [], [], ("a0", "a1", "b1", "a2", "b2")
+    rows, names = [], ("a0", "a1", "b1", "a2", "b2")
     for e in excitations:
-        key, cells = f"excitation.{e.joint}.{e.source}", (title(e.joint), source_label(e))
-        numbers = context.numbers(key, ("objective", "condition"), 5)
-        objectives.append((*cells, *numbers, context.number(f"{key}.excess_q", 2)))
-        coefficients.append((*cells, *context.numbers(key, names, 4)))
+        key = f"excitation.{e.joint}.{e.source}"
+        scores = *context.numbers(key, ("objective", "condition"), 5), context.number(f"{key}.excess_q", 2)
+        rows.append((title(e.joint), source_label(e), *scores, *context.numbers(key, names, 4)))
     caption = (
-        "Objective and condition number of published trajectories and of trajectories designed here, and the excess of "
-        "each over its position limits."
+        "Published trajectories and those designed here: objective, condition number, excess over the position limits, "
+        "and coefficients of the Fourier series."
     )
-    header = ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits")
-    yield Table(caption, header, tuple(objectives), "excitation-table", "llrrr")
+    symbols = (f"${name[0]}_{name[1]}$" for name in names)
+    header = ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits", *symbols)
+    yield Table(caption, header, tuple(rows), "excitation-table", "llrrrrrrrr")
     for e in excitations:
         for symbol, meaning in MOTION.items():
             if getattr(e, f"excess_{symbol}") > 0:
                 excess = context.results[f"excitation.{e.joint}.{e.source}.excess_{symbol}"].number(2)
                 about = f"**{title(e.joint)}**, {source_label(e)}"
                 yield Verdict("warn", f"{about}: exceeds its {meaning} limits by {excess}.")
-    symbols = (f"${name[0]}_{name[1]}$" for name in names)
-    caption, columns = "Coefficients of the Fourier series.", ("Joint", "Trajectory", *symbols)
-    yield Table(caption, columns, tuple(coefficients), align="llrrrrr")
     for joint in dict.fromkeys(e.joint for e in excitations):
         yield figure(context, [e for e in excitations if e.joint == joint])
 

@@ -2,22 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from davinci_forces import filters
 from davinci_forces.records import Comparison, FilterNoise, Streamed, Track
 from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Line, Points
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import run_cells, section_of
-
-SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
-DRAWN = {
-    "direct": ("grey", "dotted"),
-    "momentum": ("green", "dashdot"),
-    "rts": ("blue", "dashed"),
-    "ekf": ("vermillion", "solid"),
-}
 
 
 @section_of("The filter", "filters", FilterNoise)
@@ -37,19 +27,17 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
     worst = [t for space in spaces for t in context.catalogue.select(Track, log=space.log, joint=space.joint)]
     if worst:
         yield Prose(
-            "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
-            "smoother's part comes from noise and random walk. The model's part is the model's error in free motion of "
-            "other logs, which were not fitted. The root of the sum of their squares is scaled, for each range of "
-            "speed, so that 95 % of the errors in this free motion lie within 1.96 standard deviations. The offset of "
-            "the day (a constant effort that differs from day to day) may be estimated from windows without contact "
-            "and removed; then the error of this estimate is added."
+            "The stated standard deviation of the external effort combines two parts ([@error-budget]): the "
+            "smoother's, from noise and random walk, and the model's, from free motion of other logs ([@methods]). The "
+            "offset of the day (a constant effort that differs from day to day) may be estimated from windows without "
+            "contact and removed; then the error of this estimate is added."
         )
         yield budget(context, worst)
         yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
-        compared = comparison(context, comparisons), overlay(context, comparisons), noise_over_delay(noises)
-        yield OnScreen("Filters compared, in numbers and over time", "filters-compared", compared)
+        compared = comparison(context, comparisons), noise_over_delay(noises)
+        yield OnScreen("Filters compared, and noise over delay", "filters-compared", compared)
     if logs := context.catalogue.records(Streamed):
         yield OnScreen("The same filter as samples arrive", "filters-streamed", (stream_table(context, logs),))
 
@@ -146,21 +134,6 @@ def name_of(label: str) -> str:
     return filters.title(name) if name in filters.FILTERS else f"{filters.title(filters.DEFAULT)}, joint alone"
 
 
-def overlay(context: Context, compared: list[Comparison]) -> Figure:
-    """The efforts of four filters in the middle of a run, joint by joint."""
-    joints = context.joints_of(compared)
-    panels = tuple(panel([c for c in compared if c.joint == joint], i == 0) for i, joint in enumerate(joints))
-    return Figure(
-        "External effort in free motion by four filters. The true one is 0; the deviation is mainly the model's error, "
-        "which all filters share. The smoother has no delay.",
-        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst run of {count(len(joints), 'joint')}.",
-        panels,
-        "filters-figure",
-        columns=1,
-        height=30,
-    )  # fmt: skip
-
-
 def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     """What another delay would cost each joint."""
     panels = []
@@ -175,14 +148,3 @@ def noise_over_delay(noises: list[FilterNoise]) -> Figure:
         "noise-over-delay",
         height=35,
     )
-
-
-def panel(compared: list[Comparison], named: bool) -> Panel:
-    """One joint."""
-    by_name = {c.filter: c for c in compared}
-    drawn = [by_name[name] for name in DRAWN if name in by_name]
-    middle = float(np.mean(drawn[0].t))
-    near = np.abs(drawn[0].t - middle) <= 0.5 * SECONDS_DRAWN
-    lines = tuple(Line(c.t[near], c.tau_ext[near], name_of(c.filter) if named else "", *DRAWN[c.filter]) for c in drawn)  # type: ignore[arg-type]
-    heading = f"{title(drawn[0].joint)} in {drawn[0].log}"
-    return Panel(heading, "time [s]", label(drawn[0], "tau_ext", "external effort"), lines)

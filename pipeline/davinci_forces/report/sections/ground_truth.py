@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.records import Fit, TipContact, TipForce, Track
+from davinci_forces.records import Column, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import first_on_paper, run_name, section_of
+from davinci_forces.report.sections.parts import first_on_paper, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import truth_level
 
 PUSH_SHAPES = {
@@ -76,7 +76,7 @@ def effects(context: Context) -> Iterator[Table]:
     rows: list[tuple[Cell, ...]] = []
     for name, friction in context.study.truth.get("friction", {}).items():
         for joint, parameters in friction.items() if name in family else ():
-            keys = dict(used_parameters(context, joint))
+            keys = used_parameters(context, joint)
             for effect, symbols, terms in EFFECTS:
                 of_effect = [(term, context.number(key, 3)) for term, key in keys.items() if re.match(terms, term)]
                 cells = of_effect or [(terms.replace("|", ", "), "not in the model")]
@@ -95,14 +95,11 @@ def effects(context: Context) -> Iterator[Table]:
         )
 
 
-def used_parameters(context: Context, joint: str) -> Iterator[tuple[str, str]]:
+def used_parameters(context: Context, joint: str) -> dict[str, str]:
     """The parameters of a joint in the fit that the filter used, by name, with the keys of their values."""
-    name = context.used_fit(joint)
-    name = name.partition(".")[2] if name.count(".") > 1 else name
-    for fit in context.catalogue.records(Fit):
-        for parameter in map(str, fit.parameter) if f"{fit.model}.{fit.estimator}" == name else ():
-            if fit.group == joint or parameter.endswith(f" of {joint}"):
-                yield parameter.removesuffix(f" of {joint}"), f"fit.{fit.group}.{name}.{slug(parameter)}"
+    fit = context.used_record(joint) or context.fit_named(context.own_fit(joint), joint)
+    rows = of_joint(fit, joint) if fit else {}
+    return {name: ".".join(("fit", *fit.key, slug(fit.parameter[i]))) for i, name in rows.items() if fit}
 
 
 def parameters(
@@ -129,15 +126,31 @@ def parameters(
 
 def effort_figure(track: Track, pushes: list[Push]) -> Figure:
     """The effort exerted on a joint, and the smoother's estimate of it."""
-    t, effort = true_effort(pushes, float(track.t[-1]))
-    name = run_name(track.log, track.joint)
-    marks = (Line(track.t, track.tau_ext_smooth, "smoother", "vermillion"), Line(t, effort, "true", "black"))
-    return Figure(
-        f"{name}: external effort by the smoother, and the true one.",
-        f"External effort over time for {name}, tracked and true.",
-        (Panel("External effort", "time [s]", label(track, "tau_ext", "external effort"), marks),),
-        height=42,
-    )
+    effort = label(track, "tau_ext", "external effort")
+    panel = compared_panel("External effort", effort, track.t, track.tau_ext_smooth, pushes)
+    return compared_figure(f"{run_name(track.log, track.joint)}: external effort", (panel,))
+
+
+def force_figure(force: TipForce, pushes: list[Push]) -> Figure:
+    """The components of the force at the tip, estimated and true."""
+    panels = []
+    for k, name in enumerate(COMPONENTS):
+        along = [push | {"peak": force_of(push)[k]} for push in pushes]
+        unit = label(force, name, "force")
+        panels.append(compared_panel(f"Along {name[-1]}0", unit, force.t, getattr(force, name), along))
+    return compared_figure(f"{literal(force.log)}: force at the tip", tuple(panels))
+
+
+def compared_panel(heading: str, unit: str, t: Column, estimated: Column, pushes: list[Push]) -> Panel:
+    """An effort or a force over time, estimated and true."""
+    marks = Line(t, estimated, "estimated", "vermillion"), Line(*true_effort(pushes, float(t[-1])), "true", "black")
+    return Panel(heading, "time [s]", unit, marks)
+
+
+def compared_figure(subject: str, panels: tuple[Panel, ...]) -> Figure:
+    """The panels of one log."""
+    caption, alt = f"{subject}, estimated and true.", f"{subject} over time, estimated and true."
+    return Figure(caption, alt, panels, columns=len(panels), height=42)
 
 
 def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
@@ -201,20 +214,3 @@ def truth_verdict(name: str, errors: list[float]) -> Verdict:
     """Whether errors agree with the stated standard errors."""
     level, counts = truth_level(errors)
     return Verdict(level, f"**{name}**: of {count(len(errors), 'error')}, {counts}.")
-
-
-def force_figure(force: TipForce, pushes: list[Push]) -> Figure:
-    """The components of the force, estimated and true."""
-    panels = []
-    for k, name in enumerate(COMPONENTS):
-        along = [push | {"peak": force_of(push)[k]} for push in pushes]
-        t, true = true_effort(along, float(force.t[-1]))
-        marks = (Line(force.t, getattr(force, name), "estimated", "vermillion"), Line(t, true, "true", "black"))
-        panels.append(Panel(f"Along {name[-1]}0", "time [s]", label(force, name, "force"), marks))
-    return Figure(
-        f"{literal(force.log)}: force at the tip, estimated and true.",
-        f"Components of the force at the tip over time in {literal(force.log)}, estimated and true.",
-        tuple(panels),
-        columns=3,
-        height=42,
-    )

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.maths.arrays import Array, runs
+from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HapticResponse, HapticRun
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
-from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine, VSpan
+from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of
+from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of, spans_where
 
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
@@ -51,16 +51,16 @@ def traces(context: Context, run: HapticRun) -> Figure:
     """Fig 8.12 of one hand: positions above, forces below, contact shaded."""
     few = slice(None, None, max(len(run) // SAMPLES_DRAWN, 1))
     t = run.t[few]
-    shaded = tuple(spans(run))
+    shaded = spans_where(run.t, run.true_force > 0.0, "contact")
     ends = " The run ends where the hand leaves the device's reach." if run.out_of_reach else ""
-    positions = (
+    positions: tuple[AnyMark, ...] = (
         *shaded,
         HLine(0.0),
         Line(t, MM * run.plan_x[few], "plan", "grey", "dotted"),
         Line(t, MM * run.hand_x[few], "hand", "blue", "solid"),
         Line(t, MM * run.arm_x[few], "arm", "orange", "dashed"),
     )
-    forces = (
+    forces: tuple[AnyMark, ...] = (
         *shaded,
         Line(t, run.true_force[few], "true", "black", "solid"),
         Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
@@ -75,12 +75,6 @@ def traces(context: Context, run: HapticRun) -> Figure:
         f"haptic-{run.hand}",
         height=42,
     )
-
-
-def spans(run: HapticRun) -> Iterator[AnyMark]:
-    """The contacts of a run."""
-    for i, touched in enumerate(runs(run.true_force > 0.0)):
-        yield VSpan(float(run.t[touched.start]), float(run.t[min(touched.stop, len(run) - 1)]), "" if i else "contact")
 
 
 def response_figure(response: HapticResponse) -> Figure:

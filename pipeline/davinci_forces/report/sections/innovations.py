@@ -9,7 +9,14 @@ from davinci_forces.records import Column, Explanation, Innovation, Track, White
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import AnyMark, HBand, Line
 from davinci_forces.report.context import Context, count, label
-from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, run_cells, run_name, section_of
+from davinci_forces.report.sections.parts import (
+    autocorrelation,
+    converged_rows,
+    first_on_paper,
+    run_cells,
+    run_name,
+    section_of,
+)
 
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
@@ -139,8 +146,8 @@ def figure(context: Context, e: Explanation) -> Figure:
 
 def over_time(t: Track, field: str, of: str) -> Panel:
     """An innovation over time, once the filter has converged."""
-    late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
-    marks = (Line(t.t[late], getattr(t, field)[late], "", "blue"),)
+    shown = converged_rows(t.t)
+    marks = (Line(t.t[shown], getattr(t, field)[shown], "", "blue"),)
     return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
 
 

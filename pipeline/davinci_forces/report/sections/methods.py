@@ -47,7 +47,7 @@ ENTRY, FIELD = re.compile(r"@\w+\{.*?^\}", re.M | re.S), re.compile(r"^  (\w+) =
 METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
     (records.LogSummary, (
         Prose("**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear "
-              "ratio $eta$ and the torque constant $K_m$; logs of the joint side are used unchanged.{in_current}"),
+              "ratio $eta$ and the torque constant $K_m$; logs of the joint side are used unchanged."),
         Equation("q = theta_m / eta, quad tau = eta K_m i",
                  "joint position is motor angle over gear ratio; effort is gear ratio times torque constant times "
                  "current", "motor"),
@@ -163,9 +163,9 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
 @section_of("Methods", "methods")
 def section(context: Context) -> Iterator[Block]:
     """Prose and equations in the order of the stages; symbols, thresholds, a paragraph for a paper, and references."""
-    words = {"lowpass": f"{context.study.settings.lowpass:g}", "in_current": in_current(context)}
+    lowpass = f"{context.study.settings.lowpass:g}"
     for block in (block for kind, method in METHODS if context.catalogue.records(kind) for block in method):
-        yield Prose(block.text.format(**words)) if isinstance(block, Prose) else block
+        yield Prose(block.text.format(lowpass=lowpass)) if isinstance(block, Prose) else block
     header = ("Quantity", "Measure", "Good", "Caution", "Problem")
     yield Table("The thresholds of the verdicts of this report.", header, thresholds(), "thresholds", "lllll")
     yield Table("Symbols.", ("Symbol", "Is", "Unit"), SYMBOLS, "symbols", "lll")
@@ -234,14 +234,3 @@ def unseen_score(context: Context, joint: str) -> str:
     share = percent(trusted.share)
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
     return f"{joint.replace('_', ' ')}: {model}; error {error} ({share} of the effort) on {where}{level}"
-
-
-def in_current(context: Context) -> str:
-    """State the joints whose effort is a current, because no torque constant is known."""
-    joints = [joint.title.lower() for joint in context.study.robot.joints if joint.effort]
-    if not joints:
-        return ""
-    return (
-        f" No torque constant of the {', '.join(joints)} is known. Their effort is the motor's current in A, and so "
-        "are their external effort and levels."
-    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.maths.arrays import evenly
+from davinci_forces.maths.arrays import Booleans, evenly, runs
 from davinci_forces.records import (
     Column,
     Fit,
@@ -21,7 +21,7 @@ from davinci_forces.records import (
     Whiteness,
 )
 from davinci_forces.report.content import Block, Level, OnScreen, Panel, Section, Table, literal
-from davinci_forces.report.content.marks import AnyMark, HBand, Line, Points, Reference, Stems, VSpan
+from davinci_forces.report.content.marks import AnyMark, Colour, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.verdicts import Trust, decisive, mass_level
 
@@ -107,6 +107,17 @@ def contact_spans(context: Context, log: str, name: str) -> tuple[VSpan, ...]:
     """The windows of contact that the study states of a log, the first named in the legend."""
     windows = context.study.log(log).contact
     return tuple(VSpan(start, end, "" if i else name) for i, (start, end) in enumerate(windows))
+
+
+def converged_rows(t: Column) -> slice:
+    """The samples after the first second, of a short log a fifth: the filter's wide band before would hide them."""
+    return slice(int(np.searchsorted(t, t[0] + min(1.0, 0.2 * (t[-1] - t[0])))), None)
+
+
+def spans_where(t: Column, which: Booleans, name: str, colour: Colour = "orange") -> tuple[VSpan, ...]:
+    """The ranges of time in which a condition (N,) holds, the first named in the legend."""
+    ends = [(float(t[part.start]), float(t[part.stop - 1])) for part in runs(which)]
+    return tuple(VSpan(start, end, "" if i else name, colour) for i, (start, end) in enumerate(ends))
 
 
 def effort_panel(record: Track | Prediction | Residual, *spans: VSpan, heading: str = "Effort") -> Panel:

@@ -7,7 +7,6 @@ from davinci_forces.records import LogSummary
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
-from davinci_forces.study import LogEntry
 
 PER_LINE = 4  # settings
 
@@ -37,7 +36,8 @@ def section(context: Context) -> Iterator[Block]:
     if study.changed:
         yield Prose("Changes of the robot:")
         yield Listing("\n".join(f"{name}: {in_words(value)}" for name, value in study.changed.items()))
-    if turned := [f"{log.name}: {', '.join(names)}" for log in study.logs if (names := reversed_channels(log))]:
+    reversed_by_log = {log.name: [c.quantity for c in log.channels if c.sign < 0] for log in study.logs}
+    if turned := [f"{log}: {', '.join(quantities)}" for log, quantities in reversed_by_log.items() if quantities]:
         yield Prose("Quantities whose sign the study reverses (`sign = -1`):")
         yield Listing("\n".join(turned))
     if summaries := context.catalogue.records(LogSummary):
@@ -50,11 +50,6 @@ def section(context: Context) -> Iterator[Block]:
 def in_words(value: object) -> str:
     """A value of study.toml, or the keys and values of a table."""
     return ", ".join(f"{key} = {of!r}" for key, of in value.items()) if isinstance(value, dict) else str(value)
-
-
-def reversed_channels(log: LogEntry) -> list[str]:
-    """The quantities of a log whose sign the study reverses."""
-    return [source.quantity for source in log.channels if source.sign < 0]
 
 
 def channels(summaries: list[LogSummary]) -> Table:

@@ -88,7 +88,7 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = parts.run_name(t.log, t.joint), parts.contact_spans(context, t.log, "stated contact")
-    largest = float(abs(t.tau_ext_smooth[shown_rows(t)]).max(initial=0.0))
+    largest = float(abs(t.tau_ext_smooth[parts.converged_rows(t.t)]).max(initial=0.0))
     return Figure(
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
         "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band.",
@@ -104,14 +104,9 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     )  # fmt: skip
 
 
-def shown_rows(t: Track) -> slice:
-    """The rows after the first samples: the filter's wide band before it converges would set the scale of the plot."""
-    return slice(min(int(0.25 * t.rate), len(t) // 10), None)
-
-
 def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
     """The external effort over time with its band, and measured minus modelled effort unless its noise hides them."""
-    shown, effort, upper = shown_rows(t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
+    shown, effort, upper = parts.converged_rows(t.t), t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
     lower = effort - upper
     upper += effort  # in place, as a column of a long log takes much memory
     direct, room = t.tau_ext_direct[shown], float(upper[shown].max() - lower[shown].min())

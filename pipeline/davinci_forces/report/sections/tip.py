@@ -7,17 +7,17 @@ import numpy as np
 from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, TipBudget, TipContact, TipForce
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
-from davinci_forces.report.content.marks import AnyMark, Band, Bars, Colour, HLine, Line, Line3D, Points3D, VSpan
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS, Number
-from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import section_of, strokes
+from davinci_forces.report.context import Context, label, name_in_sentence
+from davinci_forces.report.sections.parts import converged_rows, section_of, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 F = ("f_x", "f_y", "f_z")
 PATH_POINTS = 600  # points drawn of the path in space
-CONVERGENCE = 1.0  # [s] time in which the filter converges; the axis of the force does not show its wide band
 MAX_FORCES = 5  # drawn of a contact beside the largest
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
@@ -52,9 +52,9 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
             yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
     budgets = {budget.log: budget for budget in context.catalogue.records(TipBudget)}
     first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
-    yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
+    yield from log_blocks(context, first, contacts.get(first.log), budgets.get(first.log))
     for force in others:
-        inside = tuple(log_blocks(force, contacts.get(force.log), budgets.get(force.log)))
+        inside = tuple(log_blocks(context, force, contacts.get(force.log), budgets.get(force.log)))
         yield OnScreen(f"Force at the tip in {literal(force.log)}", f"tip-{force.log}", inside)
 
 
@@ -116,7 +116,9 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     return Table(caption, header, rows, "tip-levels", "llrrrrrr")
 
 
-def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | None) -> Iterator[Block]:
+def log_blocks(
+    context: Context, force: TipForce, contact: TipContact | None, budget: TipBudget | None
+) -> Iterator[Block]:
     """The figures of one log."""
     name = literal(force.log)
     yield Figure(
@@ -132,31 +134,22 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
     if contact is not None:
         yield in_space(force, contact)
     if budget is not None:
-        figure = budget_figure(force, budget)
-        yield OnScreen("Error at the tip due to each joint", f"tip-parts-{force.log}", (figure,))
+        sizes = ((joint, context.number(f"tip.{force.log}.{joint}.total", 2)) for joint in budget.of_joint)
+        parts = as_list([f"{size} by {name_in_sentence(joint)}" for joint, size in sizes])
+        yield Prose(f"Standard deviation of the force at the tip in {name}, at the median pose: {parts}.")
 
 
 def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:
     """One component over time."""
-    f, std = getattr(force, f"f_{axis}"), np.sqrt(getattr(force, f"c_{axis}{axis}"))
+    shown = converged_rows(force.t)
+    t, f, std = force.t[shown], getattr(force, f"f_{axis}")[shown], np.sqrt(getattr(force, f"c_{axis}{axis}")[shown])
     spans = [] if contact is None else [VSpan(*window) for window in windows(contact)]
     marks: tuple[AnyMark, ...] = (
         *spans,
-        Band(force.t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
-        Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
+        Band(t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
+        Line(t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
-    shown = reach(force, f - NORMAL_95 * std, f + NORMAL_95 * std)
-    return Panel(f"Along {axis}0", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
-
-
-def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:
-    """The range of a band after the filter has converged; the wide band before would hide the force."""
-    values = np.concatenate([edge[force.t >= force.t[0] + CONVERGENCE] for edge in (lower, upper)])
-    values = values[np.isfinite(values)]
-    if not len(values) or np.ptp(values) == 0.0:
-        return None
-    room = 0.05 * float(np.ptp(values))
-    return float(values.min()) - room, float(values.max()) + room
+    return Panel(f"Along {axis}0", "time [s]", label(force, f"f_{axis}", "force"), marks)
 
 
 def condition_panel(force: TipForce) -> Panel:
@@ -213,19 +206,3 @@ def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line
 def windows(contact: TipContact) -> list[tuple[float, float]]:
     """The start and the end [s] of each contact."""
     return list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))
-
-
-def budget_figure(force: TipForce, budget: TipBudget) -> Figure:
-    """The error of the force at the tip due to each joint."""
-    names = tuple(title(joint) for joint in budget.of_joint)
-    parts = (("filter_force", "sensor noise and smoother"), ("model_force", "model"))
-    bars = tuple(Bars(names, getattr(budget, part), source) for part, source in parts)
-    total = ", ".join(f"{name} {size:.2g} N" for name, size in zip(names, budget.total_force, strict=True))
-    return Figure(
-        f"{literal(force.log)}: error of the force at the tip due to the error of each joint's external effort, at the "
-        f"median pose, as standard deviations; in total {total}.",
-        f"Bars of the error that each joint adds to the force at the tip in {literal(force.log)}: {total}.",
-        (Panel("Error at the tip", "", label(budget, "filter_force", "force"), bars),),
-        f"tip-budget-{force.log}",
-        height=42,
-    )

@@ -14,8 +14,6 @@ from davinci_forces.report.context import Context, label, name_in_sentence, titl
 from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, percent
 
-SIDES = ("as stated", "the other one")  # that the efforts tell
-
 
 @section_of("Attached masses", "weight")
 def section(context: Context) -> Iterator[Block]:
@@ -48,30 +46,12 @@ def section(context: Context) -> Iterator[Block]:
 
 def summary(context: Context, weights: list[Weight]) -> Table:
     """The masses of all logs."""
-    rows, sided = [], any(weight.side in SIDES for weight in weights)
+    rows = []
     for weight in weights:
-        stated, prefix = str(Number(weight.stated_mass, "kg")), f"weight.{weight.log}"
-        sides = (
-            (context.number(f"{prefix}.mass_mirrored"), weight.side if weight.side in SIDES else "undecided")
-            if sided
-            else ()
-        )
-        numbers = context.numbers(prefix, ("mass", "scale"))
-        rows.append((literal(weight.log), literal(weight.moves_with or "tip"), stated, *numbers, *sides))
+        carrier, stated = literal(weight.moves_with or "tip"), str(Number(weight.stated_mass, "kg"))
+        rows.append((literal(weight.log), carrier, stated, *context.numbers(f"weight.{weight.log}", ("mass", "scale"))))
     caption = "Masses with their standard errors. The scale is the estimated mass divided by the stated mass."
-    caption += (
-        " Mirrored: the mass at the mirrored position on its link, in case the sign of the position is wrong. Better "
-        "side: the side with the smaller residual, if they differ by two standard errors."
-    ) * sided
-    header = (
-        "Log",
-        "Moves with joint or link",
-        "Stated",
-        "Mass",
-        "Scale",
-        *(("Mirrored", "Better side") if sided else ()),
-    )
-    return Table(caption, header, rows, "weight-table", "llrrr" + "rl" * sided)
+    return Table(caption, ("Log", "Moves with joint or link", "Stated", "Mass", "Scale"), rows, "weight-table", "llrrr")
 
 
 def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table:

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.maths.arrays import runs
 from davinci_forces.records import Contact, Stiffness, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import scored_predictions, section_of, trust
+from davinci_forces.report.sections.parts import converged_rows, scored_predictions, section_of, spans_where, trust
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
 from davinci_forces.report.verdicts import Trust, band_in_words, percent
@@ -36,7 +35,6 @@ def section(context: Context) -> Iterator[Block]:
     if lines := opening.measurements(context):
         yield Bullets(lines)
     if not trusts:
-        yield Prose(opening.logs_in_words(context))
         yield from opening.nothing_identified(context)
         yield opening.sign_off(context)
         return
@@ -114,8 +112,7 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
-        f"{count(len(context.study.logs), 'log')}. "
-        f"{opening.logs_in_words(context)}{opening.currents_in_words(context)}"
+        f"{count(len(context.study.logs), 'log')}.{opening.currents_in_words(context)}"
     )
     if not contacts:
         roles = {log.role for log in context.study.logs}
@@ -180,12 +177,9 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         spans = [VSpan(start, end, "", TOUCHED) for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
-        converged = track.t - track.t[0] >= 1.0
-        line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
-        still = [
-            VSpan(float(track.t[part][0]), float(track.t[part][-1]), "" if i else "at rest: not judged", REST)
-            for i, part in enumerate(runs(track.standing > 0))
-        ]
+        shown = converged_rows(track.t)
+        line = Line(track.t[shown], track.tau_ext_smooth[shown], "external effort", "vermillion")
+        still = spans_where(track.t, track.standing > 0, "at rest: not judged", REST)
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")

@@ -13,14 +13,6 @@ from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
-USES = {  # what the logs of each role are for
-    "identification": "to identify the model",
-    "validation": "to test it on",
-    "contact": "with contact",
-    "weight": "with an attached mass",
-    "friction": "to map friction",
-    "tissue": "of pushes on tissue",
-}
 MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
 MIN_QUARTILES = 4  # pushes, below which quartiles are interpolated rather than observed
 MAX_NAMED = 3  # joints that a clause of the verdict names
@@ -102,13 +94,6 @@ def stiffnesses(context: Context) -> Iterator[str]:
         why = "; a straight line explains less than 90 % of the others" if log.pushes < len(log) else ""
         used = f" ({log.pushes} of {count(len(log), 'push')}{why})"
         yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
-
-
-def logs_in_words(context: Context) -> str:
-    """State what the logs are for, by their roles."""
-    roles = [log.role for log in context.study.logs]
-    uses = [f"{roles.count(role)} {use}" for role, use in USES.items() if role in roles]
-    return f"{'Simulated logs' if context.study.simulated else 'Logs'} of this study: {as_list(uses)}."
 
 
 def currents_in_words(context: Context) -> str:
