@@ -6,8 +6,7 @@ children, such as two jaws.  Named frames are fixed to links.  The base is body 
 Gravity acts against `up`: the z axis of the base unless the base is mounted on a wall, a ceiling or a slope.
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 4.
 
-A chain is built from placements (`placed`) or from a table of Denavit-Hartenberg parameters.  With the inertial
-parameters of its links it gives the `Tree` that the recursions take.
+With the inertial parameters of its links, a chain gives the `Tree` that the recursions take.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, of_pseudo_inertias, pseudo_inertias
 
 FIXED = -1  # the coordinate of links that do not move
 BASE = "0"
@@ -90,13 +89,40 @@ class Chain:
         return np.asarray(self.offset[[self.names.index(link) for link in self.links]])
 
 
+class ChainFrame(NamedTuple):
+    """One frame of an arm, and its inertial parameters; without a coordinate, it is fixed to its parent frame."""
+
+    name: str
+    before: int  # index of the parent frame: the base is 0
+    first: Array  # pose of its joint in the parent frame (4, 4) [m]
+    last: Array  # pose of the frame in the axes of its joint at q = 0 (4, 4) [m]
+    coordinate: int
+    slides: bool
+    parameters: Array = np.zeros(len(PARAMETERS))  # (10,), in the axes of its joint
+
+
+def chain_of(base: str, frames: Sequence[ChainFrame], tip: str) -> tuple[Chain, Array]:
+    """The chain of these frames, and the inertial parameters (L, 10) of its links.
+
+    Fixed frames add their inertia to their parent, except on the base.
+    """
+    before, coordinate = [frame.before for frame in frames], np.array([frame.coordinate for frame in frames])
+    names, offset = (base, *(frame.name for frame in frames)), np.stack([np.eye(4), *(frame.last for frame in frames)])
+    chain = Chain(
+        links=names[1:], parent=np.array(before), placement=offset[before] @ [frame.first for frame in frames],
+        slides=np.array([frame.slides for frame in frames]), coordinate=coordinate, names=names,
+        body=np.arange(len(names)), offset=offset, before=np.array([0, *before]), tip=tip, n=int(coordinate.max()) + 1,
+    )  # fmt: skip
+    return fold_fixed_links(chain, np.array([frame.parameters for frame in frames]))
+
+
 def denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
     """The chain of a table of classic parameters, T = Rz(theta) Tz(d) Tx(a) Rx(alpha).  (3.7)
 
     A link turns about z of its parent frame, and its own frame is at its far end.
     """
     transforms = [(np.eye(4), _screw(2, row.theta, row.d) @ _screw(0, row.alpha, row.a)) for row in table]
-    return _chain_of(table, tip, transforms)
+    return _chain_of_table(table, tip, transforms)
 
 
 def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
@@ -105,35 +131,17 @@ def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
     A link turns about z of its own frame.  Craig, Introduction to Robotics, section 3.4.
     """
     transforms = [(_screw(0, row.alpha, row.a) @ _screw(2, row.theta, row.d), np.eye(4)) for row in table]
-    return _chain_of(table, tip, transforms)
+    return _chain_of_table(table, tip, transforms)
 
 
-def _chain_of(table: Sequence[TableRow], tip: str, transforms: list[tuple[Array, Array]]) -> Chain:
+def _chain_of_table(table: Sequence[TableRow], tip: str, transforms: list[tuple[Array, Array]]) -> Chain:
     """The chain of a table; each row has a transform before the motion of its joint and one after."""
-    names, body, offset, before = [BASE], [0], [np.eye(4)], [0]
-    parent, placement, moving = list[int](), list[Array](), list[TableRow]()
+    names, frames = [BASE, *(row.name for row in table)], list[ChainFrame]()
     for row, (first, last) in zip(table, transforms, strict=True):
-        frame = names.index(row.before)
-        pose, index = offset[frame] @ first, body[frame]
-        if row.coordinate == FIXED:
-            last = pose @ last
-        else:
-            flipped = np.diag([1.0, row.sign, row.sign, 1.0])  # reverses the axis: Rz(-q) = Rx(pi) Rz(q) Rx(pi)
-            parent.append(index)
-            placement.append(pose @ flipped)
-            moving.append(row)
-            index, last = len(moving), flipped @ last
-        names.append(row.name)
-        body.append(index)
-        offset.append(last)
-        before.append(frame)
-    coordinate = np.array([row.coordinate for row in moving])
-    return Chain(
-        links=tuple(row.name for row in moving), parent=np.array(parent), placement=np.array(placement),
-        slides=np.array([row.slides for row in moving]), coordinate=coordinate, names=tuple(names),
-        body=np.array(body), offset=np.array(offset), before=np.array(before), tip=tip, n=int(coordinate.max()) + 1,
-        table=tuple(table),
-    )  # fmt: skip
+        flip = np.diag([1.0, row.sign, row.sign, 1.0])  # reverses the axis: Rz(-q) = Rx(pi) Rz(q) Rx(pi)
+        before = names.index(row.before)
+        frames.append(ChainFrame(row.name, before, first @ flip, flip @ last, row.coordinate, row.slides))
+    return replace(chain_of(BASE, frames, tip)[0], table=tuple(table))
 
 
 def _screw(axis: int, angle: float, length: float) -> Array:

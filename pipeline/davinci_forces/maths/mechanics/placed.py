@@ -1,4 +1,4 @@
-"""Build a chain from frames with any placement and any joint axis, as URDF describes them.
+"""Frames with any placement and any joint axis, as URDF describes them.
 
     frame = parent * placement * turn about, or shift along, axis by sign q + bias
 
@@ -7,59 +7,29 @@ joint axis.  The frame of the description becomes a named frame of the link.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import PARAMETERS, Bodies, as_bodies, of_pseudo_inertias, pseudo_inertias
-from davinci_forces.maths.mechanics.chain import FIXED, Chain
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
+from davinci_forces.maths.mechanics.chain import FIXED, ChainFrame
 
 Z = np.array([0.0, 0.0, 1.0])
 
 
-class PlacedLink(NamedTuple):
-    """The frame of one link, and its inertial parameters; without a coordinate, it is fixed to its parent frame."""
+def placed_frame(
+    name: str, before: int, placement: Array, axis: Array = Z, coordinate: int = FIXED, sign: int = 1,
+    bias: float = 0.0, slides: bool = False, parameters: Array = ChainFrame._field_defaults["parameters"],
+) -> ChainFrame:  # fmt: skip
+    """The frame with a placement (4, 4) [m] in its parent frame, which moves along or about a unit `axis` (3,) of it.
 
-    name: str
-    before: int  # index of the parent frame: the base is 0, and link i has frame i + 1
-    placement: Array  # pose in the parent frame at q = 0, without bias (4, 4) [m]
-    axis: Array = Z  # (3,) joint axis in the link's frame, of length 1
-    coordinate: int = FIXED
-    sign: int = 1  # -1 if it moves opposite to the coordinate
-    bias: float = 0.0  # joint position at q = 0 [rad or m]
-    slides: bool = False
-    parameters: Array = np.zeros(len(PARAMETERS))  # (10,), in the order of PARAMETERS
-
-
-def assemble_chain(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
-    """The chain of these links and its bodies; fixed links add their inertia to their parent, except on the base."""
-    body, offset, moving = [0], [np.eye(4)], list[PlacedLink]()
-    parent, placement, pseudo = list[int](), list[Array](), list[Array]()
-    inertias = pseudo_inertias(np.array([link.parameters for link in links]).reshape(-1, len(PARAMETERS)))
-    for link, J in zip(links, inertias, strict=True):
-        pose = offset[link.before] @ link.placement @ _bias_transform(link)
-        if link.coordinate == FIXED:
-            body.append(body[link.before])
-        else:
-            turned = _z_along(link.sign * link.axis)
-            parent.append(body[link.before])
-            placement.append(pose @ turned)
-            pseudo.append(np.zeros((4, 4)))
-            moving.append(link)
-            body.append(len(moving))
-            pose = turned.T
-        offset.append(pose)
-        if body[-1]:
-            pseudo[body[-1] - 1] = pseudo[body[-1] - 1] + pose @ J @ pose.T
-    chain = Chain(
-        links=tuple(link.name for link in moving), parent=np.array(parent), placement=np.array(placement),
-        slides=np.array([link.slides for link in moving]), coordinate=np.array([link.coordinate for link in moving]),
-        names=(base, *(link.name for link in links)), body=np.array(body), offset=np.array(offset),
-        before=np.array([0, *(link.before for link in links)]), tip=tip,
-        n=max(link.coordinate for link in moving) + 1,
-    )  # fmt: skip
-    return chain, as_bodies(of_pseudo_inertias(np.array(pseudo)))
+    The sign is -1 if it moves opposite to the coordinate; the bias is its position [rad or m] at q = 0.  The inertial
+    `parameters` (10,) are in its own axes.
+    """
+    turned = np.eye(4) if coordinate == FIXED else _z_along(sign * axis)
+    in_joint_axes = of_pseudo_inertias(turned.T @ pseudo_inertias(parameters[None]) @ turned)[0]
+    first = placement @ _shift_or_turn(axis, bias, slides) @ turned
+    return ChainFrame(name, before, first, turned.T, coordinate, slides, in_joint_axes)
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
@@ -90,14 +60,14 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def _bias_transform(link: PlacedLink) -> Array:
-    """The transform (4, 4) of a link's frame by its bias."""
+def _shift_or_turn(axis: Array, position: float, slides: bool) -> Array:
+    """The transform (4, 4) of a frame that moves to a position [rad or m] along or about an axis (3,)."""
     T = np.eye(4)
-    if link.slides:
-        T[:3, 3] = link.bias * link.axis
-    elif link.bias:
-        K = np.cross(np.eye(3), link.axis)  # K r = axis x r
-        T[:3, :3] += np.sin(link.bias) * K + (1.0 - np.cos(link.bias)) * K @ K
+    if slides:
+        T[:3, 3] = position * axis
+    elif position:
+        K = np.cross(np.eye(3), axis)  # K r = axis x r
+        T[:3, :3] += np.sin(position) * K + (1.0 - np.cos(position)) * K @ K
     return T
 
 

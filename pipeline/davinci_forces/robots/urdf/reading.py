@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import PARAMETERS
-from davinci_forces.maths.mechanics.chain import FIXED
-from davinci_forces.maths.mechanics.placed import PlacedLink, assemble_chain
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, as_bodies
+from davinci_forces.maths.mechanics.chain import FIXED, ChainFrame, chain_of
+from davinci_forces.maths.mechanics.placed import placed_frame
 from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
 from davinci_forces.robots.from_toml import wrong_name
@@ -67,8 +67,9 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
         Notes(file, outermost).problem(f"no joint moves; at least one must be {' or '.join(MOVING)}")
     if file.problems():
         return None
-    chain, bodies = assemble_chain(root, _placed(root, ordered, moved, list(coordinates), weights), _tip(root, ordered))
-    known_bodies = bodies if any(weight is not None for weight in weights.values()) else None
+    frames = _frames(root, ordered, moved, list(coordinates), weights)
+    chain, parameters = chain_of(root, frames, _tip(root, ordered))
+    known_bodies = as_bodies(parameters) if any(weight is not None for weight in weights.values()) else None
     name = outermost.attributes.get("name", "") or stem
     robot_joints = tuple(
         _joint(by_name[joint], called, moves)
@@ -147,22 +148,23 @@ def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]
     return called
 
 
-def _placed(
+def _frames(
     root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Mover], coordinates: list[str],
     weights: dict[str, Array | None],
-) -> list[PlacedLink]:  # fmt: skip
-    frames, placed = {root: 0}, list[PlacedLink]()
+) -> list[ChainFrame]:  # fmt: skip
+    indices, frames = (
+        {name: i for i, name in enumerate([root, *(joint.child for joint in ordered)])},
+        list[ChainFrame](),
+    )
     for joint in ordered:
         by, weight = moved[joint.name], weights[joint.child]
-        frames[joint.child] = len(placed) + 1
-        placed.append(
-            PlacedLink(
-                joint.child, frames[joint.parent], joint.placement, joint.axis,
-                coordinate=coordinates.index(by.by) if by.by else FIXED, sign=by.sign, bias=by.bias,
-                slides=joint.kind == "prismatic", parameters=np.zeros(len(PARAMETERS)) if weight is None else weight,
-            )
-        )  # fmt: skip
-    return placed
+        parameters = np.zeros(len(PARAMETERS)) if weight is None else weight
+        coordinate, before = coordinates.index(by.by) if by.by else FIXED, indices[joint.parent]
+        slides, pose = joint.kind == "prismatic", joint.placement
+        frames.append(
+            placed_frame(joint.child, before, pose, joint.axis, coordinate, by.sign, by.bias, slides, parameters)
+        )
+    return frames
 
 
 def _tip(root: str, ordered: Sequence[UrdfJoint]) -> str:
