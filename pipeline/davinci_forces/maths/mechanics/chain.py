@@ -163,7 +163,6 @@ class Tree(NamedTuple):
     coordinate: Any  # (L,) index of the coordinate that moves each link
     slides: Any  # (L,) whether the joint is prismatic
     moves: Any  # (L, n) whether a coordinate moves the link, itself or through an ancestor
-    carried: Any  # (L,) mass of the link and all its descendants [kg]
     rows: Any  # (L, 22) rotation and position in the parent's frame at q = 0, and inertial parameters
     up: Any  # (3,) direction against gravity in base axes
 
@@ -176,16 +175,14 @@ def tree_of(chain: Chain, parameters: Array) -> Tree:
     """The tree of a chain whose links have these inertial parameters (L, 10)."""
     L, T = len(chain.parent), chain.placement
     drives = chain.coordinate[:, None] == np.arange(chain.n)
-    moves, carried = np.zeros((L + 1, chain.n), np.bool_), np.append(0.0, parameters[:, 0])
+    moves = np.zeros((L + 1, chain.n), np.bool_)
     for i in range(L):
         moves[i + 1] = moves[chain.parent[i]] | drives[i]
-    for i in reversed(range(L)):
-        carried[chain.parent[i]] += carried[i + 1]
     still = chain.coordinate == FIXED
     rows = np.column_stack([T[:, :3, :3].reshape(-1, 9), T[:, :3, 3], parameters])
     coordinate = np.where(still, chain.n, chain.coordinate)
     slides = chain.slides | still
-    return Tree(chain.n, chain.parent, coordinate, slides, moves[1:], carried[1:], rows, np.array(chain.up))
+    return Tree(chain.n, chain.parent, coordinate, slides, moves[1:], rows, np.array(chain.up))
 
 
 def fold_fixed_links(chain: Chain, parameters: Array) -> tuple[Chain, Array]:

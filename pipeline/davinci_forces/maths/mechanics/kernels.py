@@ -95,7 +95,7 @@ def inverse_dynamics(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, tau: An
 def mass_matrices(tree: Any, q: Any, M: Any) -> None:
     """Put the mass matrices (N, n, n) of N poses (N, n) into M."""
     n, L = tree.n, len(tree.parent)
-    joints, work, entries = np.zeros((n + 1, 5, LANES)), np.zeros((L + 1, 9, LANES)), np.zeros((n, n, LANES))
+    joints, work, entries = np.zeros((n + 1, 5, LANES)), np.zeros((n * (L + 1) + 1, 6, LANES)), np.zeros((n, n, LANES))
     for first in range(0, len(q), LANES):
         last = min(first + LANES, len(q))
         load(q[first:last], q[first:last], q[first:last], joints)
@@ -103,7 +103,7 @@ def mass_matrices(tree: Any, q: Any, M: Any) -> None:
         for s in range(last - first):
             for k in range(n):
                 for o in range(n):
-                    M[first + s, k, o] = entries[k, o, s]
+                    M[first + s, k, o] = entries[max(k, o), min(k, o), s]
 
 
 @compile_and_store

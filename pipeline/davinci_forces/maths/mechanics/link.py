@@ -5,7 +5,7 @@ Every link has a frame at its joint: the link turns about, or slides along, z of
 parameters.  `cos_sin` is (cos q, sin q).  Vectors are tuples of three, in the axes of a link.  A motion is (w, e, a):
 angular velocity, angular acceleration and acceleration of the origin.  A wrench is (force, moment about the origin).
 
-Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2, 5 and 6.
+Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2 and 5.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,17 @@ Motion = tuple[Vector, Vector, Vector]
 Wrench = tuple[Vector, Vector]
 Velocity = tuple[Vector, Vector]  # angular velocity, and velocity of the origin
 CosSin = tuple[Number, Number]
-Inertia = tuple[Vector, Vector, Vector]  # first moment h; Ixx, Ixy, Ixz; Iyy, Iyz, Izz, about the origin
 Row = Sequence[float]
 
 
 def plus(a: Vector, b: Vector) -> Vector:
     """The sum of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def dot(a: Vector, b: Vector) -> Number:
+    """The scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -43,6 +47,11 @@ def times(A: Sequence[Number], r: Vector) -> Vector:
 def place(row: Row) -> Vector:
     """The position of the joint in the parent's frame."""
     return row[9], row[10], row[11]
+
+
+def inertia_tensor(row: Row) -> tuple[Number, ...]:
+    """The inertia about the link's origin, by rows."""
+    return row[16], row[17], row[18], row[17], row[19], row[20], row[18], row[20], row[21]
 
 
 def to_joint_axes(row: Row, x: Vector) -> Vector:
@@ -94,8 +103,7 @@ def link_velocity(row: Row, slides: bool, cos_sin: CosSin, q: Number, dq: Number
 def wrench_of(row: Row, motion: Motion) -> Wrench:
     """The wrench that gives a link this motion: f = m a + (e x + w x w x) h, n = h x a + I e + w x I w.  (4.9)"""
     w, e, a = motion
-    h = row[13], row[14], row[15]
-    inertia = row[16], row[17], row[18], row[17], row[19], row[20], row[18], row[20], row[21]
+    h, inertia = (row[13], row[14], row[15]), inertia_tensor(row)
     f = times(rates(w, e), h)
     f = f[0] + row[12] * a[0], f[1] + row[12] * a[1], f[2] + row[12] * a[2]
     return f, plus(cross(h, a), plus(times(inertia, e), cross(w, times(inertia, w))))
@@ -112,44 +120,11 @@ def wrench_in_parent_frame(row: Row, slides: bool, cos_sin: CosSin, q: Number, w
     return f, plus(n, cross(place(row), f))
 
 
-def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:
-    """The wrench that accelerates a body of mass m at rest by 1 rad/s^2, or 1 m/s^2, along its joint."""
-    h, (_, _, xz), (_, yz, zz) = inertia
-    zero = 0.0 * zz
-    if slides:
-        return (zero, zero, zero + m), (h[1], -h[0], zero)
-    return (-h[1], h[0], zero), (xz, yz, zz)
-
-
-def turned_inertia(cos_sin: CosSin, inertia: Inertia) -> Inertia:
-    """Transform the inertia of a link that turns to the axes of its joint at q = 0."""
-    (c, s), (h, (xx, xy, xz), (yy, yz, zz)) = cos_sin, inertia
-    cc, cs, ss, cs_xy = c * c, c * s, s * s, 2.0 * c * s * xy
-    xx_xy_xz = cc * xx - cs_xy + ss * yy, cs * (xx - yy) + (cc - ss) * xy, c * xz - s * yz
-    return from_link_axes(cos_sin, h), xx_xy_xz, (ss * xx + cs_xy + cc * yy, s * xz + c * yz, zz)
-
-
-def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:
-    """Transform the inertia of a body of mass m to a new origin; r is the position of the old origin from there."""
-    h, (xx, xy, xz), (yy, yz, zz) = inertia
-    g = h[0] + 0.5 * m * r[0], h[1] + 0.5 * m * r[1], h[2] + 0.5 * m * r[2]
-    x, y, z = 2.0 * g[0] * r[0], 2.0 * g[1] * r[1], 2.0 * g[2] * r[2]
-    xx_xy_xz = xx + y + z, xy - g[0] * r[1] - g[1] * r[0], xz - g[0] * r[2] - g[2] * r[0]
-    yy_yz_zz = yy + x + z, yz - g[1] * r[2] - g[2] * r[1], zz + x + y
-    return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), xx_xy_xz, yy_yz_zz
-
-
-def inertia_in_joint_frame(slides: bool, cos_sin: CosSin, q: Number, m: float, inertia: Inertia) -> Inertia:
-    """Transform the inertia of a link and all its descendants to the frame of its joint at q = 0."""
-    return shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(cos_sin, inertia)
-
-
-def inertia_in_parent_frame(row: Row, m: float, inertia: Inertia) -> Inertia:
-    """Transform an inertia of mass m from the frame of a joint at q = 0 to the frame of the parent link."""
-    h, (xx, xy, xz), (yy, yz, zz) = inertia
-    x, y, z = times(row, (xx, xy, xz)), times(row, (xy, yy, yz)), times(row, (xz, yz, zz))  # columns of R I
-    a, b, c = times(row, (x[0], y[0], z[0])), times(row, (x[1], y[1], z[1])), times(row, (x[2], y[2], z[2]))
-    return shifted_inertia(m, place(row), (times(row, h), a, (b[1], b[2], c[2])))
+def momentum(row: Row, velocity: Velocity) -> Velocity:
+    """The angular momentum of a link about its origin, h x v + I w, and its momentum, m v + w x h."""
+    (w, v), h = velocity, (row[13], row[14], row[15])
+    m_v = row[12] * v[0], row[12] * v[1], row[12] * v[2]
+    return plus(cross(h, v), times(inertia_tensor(row), w)), plus(m_v, cross(w, h))
 
 
 def columns(motion: Motion, J: Velocity) -> tuple[Number, ...]:
@@ -159,10 +134,10 @@ def columns(motion: Motion, J: Velocity) -> tuple[Number, ...]:
     (w x u) . J = u . (J x w).
     """
     (w, e, a), (J_w, J_v) = motion, J
-    w_w, w_J = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], w[0] * J_v[0] + w[1] * J_v[1] + w[2] * J_v[2]
+    w_w, w_J = dot(w, w), dot(w, J_v)
     h, g = plus(cross(J_v, e), cross(a, J_w)), cross(J_w, w)
     return (
-        a[0] * J_v[0] + a[1] * J_v[1] + a[2] * J_v[2],
+        dot(a, J_v),
         h[0] + w[0] * w_J - w_w * J_v[0],
         h[1] + w[1] * w_J - w_w * J_v[1],
         h[2] + w[2] * w_J - w_w * J_v[2],

@@ -1,7 +1,7 @@
 """The dynamics of a tree of links: motions are computed from the base outwards, wrenches from the tips inwards.
 
-Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5 and 6), and the regressor; `link` has
-the equations of one link.  Where several links share a coordinate, its effort is the sum of theirs.
+Recursive Newton-Euler (Featherstone 2008, chapter 5) and the regressor; `link` has the equations of one link.
+Where several links share a coordinate, its effort is the sum of theirs.
 
 The same source runs on numpy arrays and in compiled loops (`kernels`).  The last axis of every array has S samples.
 In compiled code `samples` is `range(S)`; in numpy it has one element, a slice of all samples.  `joints` (n + 1, 5, S)
@@ -16,10 +16,9 @@ from typing import Any
 
 from davinci_forces.maths.mechanics import link
 from davinci_forces.maths.mechanics.chain import Tree
-from davinci_forces.maths.mechanics.link import Vector, plus
+from davinci_forces.maths.mechanics.link import Vector, dot, plus
 
 Samples = Iterable[Any]
-FIRST_MOMENT = 13  # index of the first moment (3 numbers) in a row of `tree.rows`; 6 numbers of the inertia come next
 
 
 def vector(body: Any, first: int, s: Any) -> Vector:
@@ -87,52 +86,35 @@ def inverse_dynamics(tree: Tree, gravity: float, joints: Any, scratch: Any, tau:
 
 
 def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples) -> None:
-    """Fill M (n, n, S).  (4.38)
+    """Fill the lower triangle of M (n, n, S), the sum over links of J' I J with a link's spatial inertia I.  (4.38)
 
-    `scratch` has 9 numbers of each body: the first moment and the inertia of the body with all links that it carries,
-    whose mass is in `tree.carried`.  The base's row is reused for the wrench that a unit acceleration of one joint
-    causes; it is transformed from link to link towards the base.
+    `scratch` has n blocks of L + 1 rows of 6 numbers: the velocity of every body if only coordinate k moves, with unit
+    velocity.  One more row has the momentum of one link.
     """
-    wrench = scratch[0]
+    bodies, momentum = len(tree.parent) + 1, scratch[tree.n * (len(tree.parent) + 1)]
     for k in range(tree.n):
-        for column in range(tree.n):
-            fill(M[k, column], 0.0, samples)
-    for i in range(len(tree.parent)):
-        for c in range(9):
-            fill(scratch[i + 1, c], tree.rows[i][FIRST_MOMENT + c], samples)
-    for i in range(len(tree.parent) - 1, -1, -1):
-        k, slides, m, body = tree.coordinate[i], tree.slides[i], tree.carried[i], scratch[i + 1]
-        for s in samples:
-            f, n = link.unit_wrench(slides, m, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
-            store(wrench, 0, s, f)
-            store(wrench, 3, s, n)
-        add_effort(M[k, k], wrench, slides, samples)
-        if tree.parent[i] > 0:
-            constants, joint, parent = tree.rows[i], joints[k], scratch[tree.parent[i]]
-            for s in samples:
-                inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                cos_sin = joint[0, s], joint[1, s]
-                h, I_xx_xy_xz, I_yy_yz_zz = link.inertia_in_joint_frame(slides, cos_sin, joint[2, s], m, inertia)
-                store(body, 0, s, h)
-                store(body, 3, s, I_xx_xy_xz)
-                store(body, 6, s, I_yy_yz_zz)
-            for s in samples:
-                inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, I_xx_xy_xz, I_yy_yz_zz = link.inertia_in_parent_frame(constants, m, inertia)
-                store(parent, 0, s, plus(vector(parent, 0, s), h))
-                store(parent, 3, s, plus(vector(parent, 3, s), I_xx_xy_xz))
-                store(parent, 6, s, plus(vector(parent, 6, s), I_yy_yz_zz))
-        j = i
-        while tree.parent[j] > 0:
-            constants, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
-            for s in samples:
-                cos_sin, link_wrench = (joint[0, s], joint[1, s]), (vector(wrench, 0, s), vector(wrench, 3, s))
-                f, n = link.wrench_in_parent_frame(constants, slides, cos_sin, joint[2, s], link_wrench)
-                store(wrench, 0, s, f)
-                store(wrench, 3, s, n)
-            j = tree.parent[j] - 1
-            add_effort(M[k, tree.coordinate[j]], wrench, tree.slides[j], samples)
-            add_effort(M[tree.coordinate[j], k], wrench, tree.slides[j], samples)
+        for o in range(k + 1):
+            fill(M[k, o], 0.0, samples)
+    for i in range(bodies - 1):
+        constants, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
+        for k in range(tree.n):
+            if tree.moves[i][k]:
+                unit = 1.0 if k == tree.coordinate[i] else 0.0
+                parent, body = scratch[k * bodies + tree.parent[i]], scratch[k * bodies + i + 1]
+                for s in samples:
+                    cos_sin, velocity = (joint[0, s], joint[1, s]), (vector(parent, 0, s), vector(parent, 3, s))
+                    w, v = link.link_velocity(constants, slides, cos_sin, joint[2, s], unit, velocity)
+                    store(body, 0, s, w)
+                    store(body, 3, s, v)
+                    angular, linear = link.momentum(constants, (w, v))
+                    store(momentum, 0, s, angular)
+                    store(momentum, 3, s, linear)
+                for o in range(k + 1):
+                    if tree.moves[i][o]:
+                        other = scratch[o * bodies + i + 1]
+                        for s in samples:
+                            moment = dot(vector(other, 0, s), vector(momentum, 0, s))
+                            M[k, o, s] += moment + dot(vector(other, 3, s), vector(momentum, 3, s))
 
 
 def regressor(tree: Tree, gravity: float, joints: Any, scratch: Any, Y: Any, samples: Samples) -> None:

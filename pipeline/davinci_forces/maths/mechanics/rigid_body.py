@@ -37,9 +37,11 @@ def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | Non
         mass_matrices(tree, _rows(q), M.reshape(-1, n, n))
     else:
         joints = _joints(q, q, q)
-        entries, work = np.empty((n, n, joints.shape[2])), np.zeros((len(tree.parent) + 1, 9, joints.shape[2]))
+        N, L = joints.shape[2], len(tree.parent)
+        entries, work = np.empty((n, n, N)), np.zeros((n * (L + 1) + 1, 6, N))
         recursions.mass_matrix(tree.lists(), joints, work, entries, ALL)
-        M = np.moveaxis(entries, -1, 0).reshape(*q.shape, n)
+        lower = np.tril(np.moveaxis(entries, -1, 0))
+        M = (lower + np.tril(lower, -1).swapaxes(1, 2)).reshape(*q.shape, n)
     return M if drives is None else np.asarray(M + np.diag(drives.inertia))
 
 
