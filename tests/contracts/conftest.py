@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.maths.excitation.joint import Design
 from davinci_forces.maths.mechanics.kinematics import jacobian
 from davinci_forces.maths.simulation import continuous
 from davinci_forces.maths.simulation.surroundings import triangle
@@ -154,7 +153,7 @@ def shorten(patch: pytest.MonkeyPatch) -> None:
     """Leave out what takes long of a design, and none of the kinds of record that it makes."""
     patch.setattr(continuous, "RELATIVE", 1e-4)
     patch.setattr(continuous, "ABSOLUTE", 1e-6)
-    patch.setattr(design, "design", lambda problem, *_: Design(series(problem.period), np.zeros(1)))
+    patch.setattr(design, "design", lambda problem, *_: (series(problem.period), np.zeros(1)))
 
 
 def series(period: float) -> Fourier:

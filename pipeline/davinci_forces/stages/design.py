@@ -126,7 +126,7 @@ def excitations(joint: Joint) -> Iterator[Excitation]:
     if joint.published and all(np.isfinite(pair).all() for pair in limits_of(joint)):
         period = joint.published[0][1][0]
         problem = ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant")
-        yield excitation_record(joint, "found", design(problem, STARTS, 0).series)
+        yield excitation_record(joint, "found", design(problem, STARTS, 0)[0])
 
 
 def limits_of(joint: Joint) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:

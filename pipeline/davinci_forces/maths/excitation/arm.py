@@ -58,7 +58,7 @@ class Stage(NamedTuple):
 
     problem: ArmExcitationProblem
     bases: list[tuple[Array, Array, Array]]  # at the samples of the criterion, for each joint
-    limit_bases: list[tuple[Array, Array, Array]]
+    joint_limits: list[tuple[Array, Array]]  # A (6 G, 1 + 2 N_f), b (6 G,) of each joint: A x - b is its excess
     scale: Array  # of the velocity of each joint (n,)
 
     @classmethod
@@ -69,8 +69,8 @@ class Stage(NamedTuple):
         half = np.ptp(np.array([joint.limits for joint in problem.joints]), axis=-1) / 2  # (n, 3)
         top = 2 * np.pi / period * np.array(harmonics)
         scale = np.min([half[:, 0] * 2 * np.pi / period, half[:, 1], half[:, 2] / top], axis=0)
-        bases, limit_bases = ([basis(period, N, times) for N in harmonics] for times in (t, dense))
-        return cls(problem, bases, limit_bases, scale)
+        joint_limits = [_joint_limits(joint, basis(period, joint.harmonics, dense)) for joint in problem.joints]
+        return cls(problem, [basis(period, N, t) for N in harmonics], joint_limits, scale)
 
     def coefficients(self, z: Array) -> list[Array]:
         """The coefficients of each joint: z in units of its scale, about the middle of its positions."""
@@ -216,10 +216,9 @@ def _lagrangian(
     slopes[0] += _slopes(lambda q: np.asarray((limits.depth(q) * of_depths).sum(axis=-1)), [q])[0]
     slopes[1] += of_joints[1] + of_joints[2] * (1 - np.tanh(dq / width) ** 2) / width
     slopes[2] += of_joints[0]
-    for i, (joint, B, Q) in enumerate(zip(problem.joints, stage.bases, stage.limit_bases, strict=True)):
-        c, dc = _joint_excess(joint, Q, x[i])
-        after.append(mu * np.maximum(0.0, c + before[1 + i] / mu))
-        gradient.append(sum(slopes[d][:, i] @ B[d] for d in range(3)) + dc(after[-1]))
+    for i, (B, (A, b)) in enumerate(zip(stage.bases, stage.joint_limits, strict=True)):
+        after.append(mu * np.maximum(0.0, A @ x[i] - b + before[1 + i] / mu))
+        gradient.append(sum(slopes[d][:, i] @ B[d] for d in range(3)) + after[-1] @ A)
     value += sum(float((part**2).sum()) for part in after) / (2 * mu)
     return value, np.concatenate([s * part for s, part in zip(stage.scale, gradient, strict=True)]), after
 
@@ -235,15 +234,14 @@ def _slopes(function: Callable[..., Array], motion: Sequence[Array]) -> list[Arr
     return slopes
 
 
-def _joint_excess(joint: ExcitationProblem, bases: Sequence[Array], x: Array) -> tuple[Array, Callable[[Array], Array]]:
-    """The excess (6 G,) over a joint's limits, in shares of half their range, and its derivative by x, transposed."""
+def _joint_limits(joint: ExcitationProblem, bases: Sequence[Array]) -> tuple[Array, Array]:
+    """A (6 G, 1 + 2 N_f) and b (6 G,): A x - b is the excess over the limits, in shares of half their range."""
     rows, bounds = [], []
     for (low, high), B in zip(joint.limits, bases, strict=True):
         half, middle = ((high - low) / 2, (high + low) / 2) if np.isfinite([low, high]).all() else (np.inf, 0.0)
         rows += [B / half, -B / half]
         bounds += [np.full(len(B), 1 + middle / half), np.full(len(B), 1 - middle / half)]
-    A = np.concatenate(rows)
-    return A @ x - np.concatenate(bounds), lambda weights: weights @ A
+    return np.concatenate(rows), np.concatenate(bounds)
 
 
 def _columns(Y: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None) -> Array:

@@ -71,31 +71,25 @@ def instants(period: float, samples: int = PERIOD_SAMPLES) -> Array:
     return np.arange(samples, dtype=np.float64) * (period / samples)
 
 
-def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
-    """The times [s] within a period at which position, velocity and acceleration may be extreme: 2 N_f + 1 of each.
+def ranges(series: Fourier) -> tuple[Range, Range, Range]:
+    """The lowest and highest position, velocity and acceleration at any time, also between samples.
 
     Multiplied by z^N_f, z = exp(i omega t), the derivative of a trigonometric polynomial is a polynomial in z.  Its
-    roots on the unit circle are the extrema.  The angles of *all* roots are returned: rounding may move a double root
+    roots on the unit circle are the extrema.  The angles of *all* roots are tried: rounding may move a double root
     off the circle.  Additional angles do no harm, since a value of the series at any angle lies within its range.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
-    times = []
-    for derivative in (velocity, 1j * k * velocity, -(k**2) * velocity):
+    extremes = list[Range]()
+    for i, derivative in enumerate((velocity, 1j * k * velocity, -(k**2) * velocity)):
         size = np.abs(derivative)
         # A coefficient that is only rounding error would spoil the roots.
         derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)
         roots = np.roots(np.concatenate([derivative[::-1], [0.0], derivative.conj()]))
         angles = np.concatenate([[0.0], np.angle(roots) % (2 * np.pi)])
-        times.append(angles * (series.period / (2 * np.pi)))
-    return times[0], times[1], times[2]
-
-
-def ranges(series: Fourier) -> tuple[Range, Range, Range]:
-    """The lowest and highest position, velocity and acceleration at any time, also between samples."""
-    values = [motion(series, t)[i] for i, t in enumerate(turning_points(series))]
-    q, dq, ddq = ((float(v.min()), float(v.max())) for v in values)
-    return q, dq, ddq
+        values = motion(series, angles * (series.period / (2 * np.pi)))[i]
+        extremes.append((float(values.min()), float(values.max())))
+    return extremes[0], extremes[1], extremes[2]
 
 
 def observation(terms: Sequence[Term], series: Fourier, samples: int = PERIOD_SAMPLES) -> Array:
@@ -106,9 +100,6 @@ def observation(terms: Sequence[Term], series: Fourier, samples: int = PERIOD_SA
 def _columns(constant: float, of_a: Array, of_b: Array) -> Array:
     pairs = np.stack([of_a, of_b], axis=2).reshape(len(of_a), -1)
     return np.column_stack([np.full(len(of_a), constant), pairs])
-
-
-Criterion = Callable[[Array], Array]
 
 
 def determinant(F: Array) -> Array:
@@ -140,7 +131,7 @@ def _where_full_rank(F: Array, smallest: Array, largest: Array, value: Callable[
         return np.where(full, value(), np.inf)
 
 
-CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condition}
+CRITERIA = {"determinant": determinant, "condition": condition}
 
 
 def determinant_gradient(F: Array) -> tuple[float, Array]:
@@ -167,8 +158,7 @@ GRADIENTS = {"determinant": determinant_gradient, "condition": condition_gradien
 def expected_std(F: Array, noise: Array) -> Array:
     """Standard errors (p,) of least squares on F (K, p) with white noise of standard deviations `noise` (K,).
 
-    They are the roots of the diagonal of (F^T W F)^-1, with W = diag(1 / noise^2), and infinite without full rank.
-    (6.31)
+    They are the roots of the diagonal of (F^T diag(1 / noise^2) F)^-1, and infinite without full rank.  (6.31)
     """
     R = qr_factor(F / noise[:, None])
     if not np.isfinite(condition(R)):
@@ -186,26 +176,20 @@ def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Ar
     return q, dsigma * dq, dsigma**2 * ddq + ddsigma * dq
 
 
-KeepsLimits = Callable[[Array, Array, Array], bool]  # of a motion (K, n), for limits that couple the joints
-
-
 def shortest_run_in(
-    series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array, keeps_limits: KeepsLimits | None = None
-) -> float | None:
+    series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array,
+    keeps_limits: Callable[[Array, Array, Array], bool] | None = None,
+) -> float | None:  # fmt: skip
     """The first of the ascending `durations` [s] for which all run-ins keep their limits of acceleration, or None.
 
     If a series itself exceeds the limits, its run-in may reach the accelerations of the series.  `keeps_limits`
-    may set limits to the motion of all series together.
+    of a motion (K, n) tells whether it keeps limits that couple the joints.
     """
-    bounds = []
-    for joint_series, (low, high) in zip(series, accelerations, strict=True):
-        lowest, highest = ranges(joint_series)[2]
-        bounds.append((min(low * (1 - LIMIT_MARGIN), lowest), max(high * (1 - LIMIT_MARGIN), highest)))
+    limits, reached = np.array(accelerations) * (1 - LIMIT_MARGIN), np.array([ranges(s)[2] for s in series])
+    low, high = np.minimum(limits[:, 0], reached[:, 0]), np.maximum(limits[:, 1], reached[:, 1])
     for duration in durations.tolist():
         t = np.linspace(-duration, 0.0, RUN_IN_INSTANTS)
         q, dq, ddq = (np.stack(x, axis=-1) for x in zip(*(run_in(s, t, duration) for s in series), strict=True))
-        ranges_of_ddq = zip(bounds, ddq.min(axis=0), ddq.max(axis=0), strict=True)
-        within_limits = all(low <= least and largest <= high for (low, high), least, largest in ranges_of_ddq)
-        if within_limits and (keeps_limits is None or keeps_limits(q, dq, ddq)):
+        if ((low <= ddq) & (ddq <= high)).all() and (keeps_limits is None or keeps_limits(q, dq, ddq)):
             return float(duration)
     return None

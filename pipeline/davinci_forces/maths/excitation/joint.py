@@ -10,7 +10,6 @@ standstill friction jumps, and with it the criterion.  The best standstills are 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +41,6 @@ class ExcitationProblem:
         return np.array([sum(self.limits[0]) / 2, *[0.0] * (2 * self.harmonics)])
 
 
-class Design(NamedTuple):
-    """A designed trajectory, and the lowest criterion that each start of the search reached (starts,)."""
-
-    series: Fourier
-    optima: Array
-
-
 def impossible(limits: tuple[Range, Range, Range]) -> str:
     """The reason why no periodic motion can keep these limits; "" if one can."""
     (low, high), *rates = limits
@@ -65,8 +57,10 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
     return ""
 
 
-def design(problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None) -> Design:
-    """Design the trajectory of the best of several starts of the search; `report_start` reports each.  (6.27)
+def design(
+    problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart | None = None
+) -> tuple[Fourier, Array]:
+    """Design the trajectory of the best of several starts, and return the criterion of each (starts,), too.  (6.27)
 
     Raises ValueError if the limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
@@ -83,7 +77,7 @@ def design(problem: ExcitationProblem, starts: int, seed: int, report_start: Rep
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")
     x = trajectories(problem, best[None])[0]
-    return Design(shrink_to_limits(problem, Fourier.from_coefficients(x, problem.period)), values)
+    return shrink_to_limits(problem, Fourier.from_coefficients(x, problem.period)), values
 
 
 def trajectories(problem: ExcitationProblem, z: Array) -> Array:
@@ -96,17 +90,13 @@ def shrink_to_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
 
     The trajectories within the limits are a convex set, so the factor follows from the exact extrema of the series.
     """
-    scale = 1.0
-    middles = (problem.centre[0], 0.0, 0.0)
+    scale, middles = 1.0, (problem.centre[0], 0.0, 0.0)
     for (low, high), (low_x, high_x), middle in zip(problem.limits, ranges(series), middles, strict=True):
         scale = max(scale, (high_x - middle) / (high - middle), (low_x - middle) / (low - middle))
     if scale == 1.0:
         return series
     motion = (series.x - problem.centre) / (scale * (1 + MARGIN))
     return Fourier.from_coefficients(problem.centre + motion, series.period)
-
-
-Indices = NDArray[np.intp]
 
 
 def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
@@ -136,10 +126,9 @@ def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:
 
     The cube favours phases much smaller than the phase between two of the `samples` instants.
     """
-    free = z[:, -2]
     complete = z.copy()
     complete[:, -2] = -z[:, 1:-2:2].sum(axis=1)
-    return complete, np.pi / samples * free**3
+    return complete, np.pi / samples * z[:, -2] ** 3
 
 
 def delay(z: Array, phase: Array) -> Array:
@@ -167,7 +156,7 @@ def extremes(c: Array, period: float) -> tuple[Array, Array]:
     return values.min(axis=-1), values.max(axis=-1)
 
 
-def _values(c: Array, period: float, derivative: Indices, row: Indices, time: Array) -> Array:
+def _values(c: Array, period: float, derivative: NDArray[np.intp], row: NDArray[np.intp], time: Array) -> Array:
     """Position (0), velocity (1) or acceleration (2) of the `row` (P,) of c, at a `time` (P,) in periods."""
     jw = 2j * np.pi / period * np.arange(1, c.shape[1] // 2 + 1)
     phasors = (c[:, ::2] - 1j * c[:, 1::2]).T * np.array([1 / jw, np.ones_like(jw), jw])[..., None]

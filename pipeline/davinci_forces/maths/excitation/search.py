@@ -17,11 +17,11 @@ GENERATIONS = 24  # for each dimension
 # otherwise it returns the memory of all trajectories at every step, which takes half of the time.
 RETAINED = 2**21
 COLLAPSED = 1e-6  # a population is spread again if the range of its objective is below this
-SPREAD = (1e-6, 0.1)  # smallest and largest step of that spread, drawn log-uniformly
+SPREAD = (-6.0, -1.0)  # powers of ten of the smallest and the largest step of that spread
 STEP_FACTORS = (0.5, 1.0)  # range of the factor of a difference between two candidates
 CROSSING = 0.9  # share of the variables that a step changes
 
-Objective = Callable[[Array], Array]  # the objective (S,) of S candidates (S, d)
+Objective = Callable[[Array], Array]  # of S candidates (S, d)
 ReportStart = Callable[[int, int, float], None]  # takes the number of a start, from 1, of all starts, and the optimum
 Result = TypeVar("Result")
 
@@ -61,23 +61,17 @@ def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[
         if value.max() <= value.min() + COLLAPSED:
             z = _spread(z[value.argmin()], len(z), random)
             value = objective(z)
-        candidates = _steps(z, z[value.argmin()], random)
+        a, b = random.integers(len(z), size=(2, len(z)))
+        moved = z[value.argmin()] + random.uniform(*STEP_FACTORS) * (z[a] - z[b])
+        candidates = np.where(random.uniform(size=z.shape) < CROSSING, moved, z)
         new = objective(candidates)
         better = new < value
         z[better], value[better] = candidates[better], new[better]
     return z[value.argmin()], float(value.min())
 
 
-def _steps(z: Array, best: Array, random: np.random.Generator) -> Array:
-    """A new candidate for each candidate of the population (n, d)."""
-    a, b = random.integers(len(z), size=(2, len(z)))
-    moved = best + random.uniform(*STEP_FACTORS) * (z[a] - z[b])
-    return np.where(random.uniform(size=z.shape) < CROSSING, moved, z)
-
-
 def _spread(best: Array, n: int, random: np.random.Generator) -> Array:
     """A population (n, d) around the best candidate, which is its first member."""
-    smallest, largest = np.log10(SPREAD).tolist()
-    size = 10 ** random.uniform(smallest, largest, size=(n, 1))
+    size = 10 ** random.uniform(*SPREAD, size=(n, 1))
     size[0] = 0.0
     return np.asarray(best + size * random.normal(size=(n, len(best))))

@@ -150,10 +150,10 @@ def _excitation(
 ) -> ExcitationTrajectory:
     if request.evaluate is None:
         try:
-            best = design(problem, request.starts or STARTS, request.seed, report_start)
+            series, optima = design(problem, request.starts or STARTS, request.seed, report_start)
         except ValueError as error:
             raise BadRequest(f"{joint.name}: {error}") from None
-        return ExcitationTrajectory(joint, problem, best.series, tuple(best.optima.tolist()), noise)
+        return ExcitationTrajectory(joint, problem, series, tuple(optima.tolist()), noise)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         raise BadRequest(f"--evaluate takes a0,a1,b1,a2,b2, or a0 and a pair for each harmonic, not {len(x)} numbers")
