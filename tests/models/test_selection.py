@@ -49,9 +49,9 @@ def test_leaving_cells_out_is_least_squares_on_the_other_rows():
     out = np.arange(CELLS) < 2
     kept = ~out[CELL]
     theta, *_ = np.linalg.lstsq(PHI[kept, 0], TAU[kept, 0])
-    assert_allclose(solve(equations.sum_cells(~out), PLAIN), theta, rtol=1e-10)
+    assert_allclose(solve(equations.sum_groups([~out]), PLAIN), theta, rtol=1e-10)
     error = TAU[~kept, 0] - PHI[~kept, 0] @ theta
-    assert equations.sum_cells(out).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
+    assert equations.sum_groups([out]).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
 
 
 def test_logs_side_by_side_are_those_gathered_together_and_one_that_is_not_there_counts_nothing():
@@ -99,7 +99,7 @@ def test_what_is_predicted_has_not_been_seen():
 
 
 def test_a_ridge_is_least_squares_with_rows_of_scaled_columns():
-    equations = sum_equations(PHI, TAU, CELL, 1 + CELL.max()).sum_cells(np.ones(CELLS, bool))
+    equations = sum_equations(PHI, TAU, CELL, 1 + CELL.max()).sum_groups([np.ones(CELLS, bool)])
     size = np.linalg.norm(PHI[:, 0], axis=0)
     rows = np.vstack([PHI[:, 0], np.sqrt(0.3) * np.diag(size)])
     theta, *_ = np.linalg.lstsq(rows, np.append(TAU[:, 0], np.zeros(P)))
@@ -116,7 +116,7 @@ def test_the_penalty_of_combinations_is_that_of_the_smallest_parts_they_can_have
 
 def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():
     twice = np.concatenate([PHI, PHI[:, :, :1]], axis=2)
-    equations = sum_equations(twice, TAU, CELL, CELLS).sum_cells(np.ones(CELLS, bool))
+    equations = sum_equations(twice, TAU, CELL, CELLS).sum_groups([np.ones(CELLS, bool)])
     with pytest.raises(np.linalg.LinAlgError, match="dependent"):
         solve(equations, PLAIN)
     theta = solve(equations, PLAIN._replace(strength=1e-6))
@@ -124,7 +124,7 @@ def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():
 
 
 def test_the_covariance_of_parameters_is_the_textbook_s_without_a_ridge():
-    equations = sum_equations(PHI, TAU, CELL, CELLS).sum_cells(np.ones(CELLS, bool))
+    equations = sum_equations(PHI, TAU, CELL, CELLS).sum_groups([np.ones(CELLS, bool)])
     expected = 0.01 * np.linalg.inv(PHI[:, 0].T @ PHI[:, 0])
     assert_allclose(covariance(equations, PLAIN, np.array([0.01])), expected, rtol=1e-9)
 
@@ -204,7 +204,7 @@ def test_joints_weigh_by_the_variance_that_their_own_models_leave_and_without_an
     efforts = {"loud": (10.0 * TAU, PHI), "plain": (TAU, PHI), "none": (0.0 * TAU, PHI), "no column": (TAU, 0.0 * PHI)}
     cells = [sum_equations(Phi, tau, CELL, CELLS) for tau, Phi in efforts.values()]
     weights = weights_of([SimpleNamespace(by_block=each, ridge=PLAIN) for each in cells])
-    residual = TAU[:, 0] - PHI[:, 0] @ solve(cells[1].sum_cells(np.ones(CELLS, bool)), PLAIN._replace(strength=1e-3))
+    residual = TAU[:, 0] - PHI[:, 0] @ solve(cells[1].sum_groups([np.ones(CELLS, bool)]), PLAIN._replace(strength=1e-3))
     assert_allclose(weights, [0.01 / (residual @ residual), 1.0 / (residual @ residual), 0.0, 0.0], rtol=1e-9)
 
 

@@ -147,13 +147,15 @@ class RefitModel:
 
     def excites_all(self, cells: Equations, out: Booleans) -> bool:
         """Whether the cells of a refit excite every base parameter that all cells excite."""
-        return excited_parameters(cells.sum_cells(~out), self._ridge) == excited_parameters(sum_all(cells), self._ridge)
+        return excited_parameters(cells.sum_groups([~out]), self._ridge) == excited_parameters(
+            sum_all(cells), self._ridge
+        )
 
     def theta(self, cells: Equations, out: Booleans) -> Array:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
         key = out.tobytes()
         if key not in self._thetas:
-            self._thetas[key] = solve(cells.sum_cells(~out), self._ridge)
+            self._thetas[key] = solve(cells.sum_groups([~out]), self._ridge)
         return self._thetas[key]
 
 

@@ -40,10 +40,6 @@ class Equations(NamedTuple):
     right: Array  # (C, m, p)
     squares: Array  # (C, m)
 
-    def sum_cells(self, cells: Booleans) -> "Equations":
-        """Sum the equations of these cells (C,)."""
-        return self.sum_groups([cells])
-
     def sum_groups(self, groups: Iterable[Booleans]) -> "Equations":
         """Sum the equations of the cells (C,) of each of G groups, as G cells."""
         cells = list(groups)
@@ -79,7 +75,7 @@ def sum_equations(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equatio
 
 def sum_all(cells: Equations) -> Equations:
     """Sum the equations of all cells."""
-    return cells.sum_cells(np.ones(len(cells.gram), np.bool_))
+    return cells.sum_groups([np.ones(len(cells.gram), np.bool_)])
 
 
 def side_by_side(parts: Sequence[Equations], places: Sequence[int], count: int) -> Equations:
@@ -253,12 +249,12 @@ def standard_error(candidate: CrossValidation, reference: CrossValidation | None
     """Standard error of a score, or of the difference of two scores, by the jackknife over groups."""
     variances = []
     for i, shares in enumerate(candidate.unseen):
-        values = [shares, *([reference.unseen[i]] if reference else [])]
         G = len(shares)
         others = (1.0 - np.eye(G)) * G / (G - 1)
-        scores = [np.sqrt(others @ x).mean(axis=1) for x in values]
-        differences = scores[0] - scores[1] if reference else scores[0]
-        variances.append((G - 1) / G * float(((differences - differences.mean()) ** 2).sum()))
+        scores = np.sqrt(others @ shares).mean(axis=1)
+        if reference:
+            scores -= np.sqrt(others @ reference.unseen[i]).mean(axis=1)
+        variances.append((G - 1) * scores.var())
     return float(np.sqrt(np.mean(variances)))
 
 
@@ -272,9 +268,8 @@ def choose_candidate(
 
     Raises ValueError if no candidate is eligible.
     """
-    indices = [i for i, good in enumerate(eligible) if good]
-    best = min(indices, key=lambda i: candidates[i].score)
-    excess = {i: candidates[i].score - candidates[best].score for i in indices}
-    near = [i for i in indices if excess[i] <= CLEARLY * standard_error(candidates[i], candidates[best])]
-    lowest = min(ranks[i] for i in near)
-    return min((i for i in indices if ranks[i] == lowest), key=lambda i: candidates[i].score), best
+    scores = {i: candidates[i].score for i, good in enumerate(eligible) if good}
+    best = min(scores, key=scores.__getitem__)
+    bounds = {i: scores[best] + CLEARLY * standard_error(candidates[i], candidates[best]) for i in scores}
+    lowest = min(ranks[i] for i in scores if scores[i] <= bounds[i])
+    return min((i for i in scores if ranks[i] == lowest), key=scores.__getitem__), best

@@ -89,22 +89,19 @@ def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:
     """
     L, n = mechanism.links, F.shape[1]
     to_ten, B = parameters_of_entries(), np.zeros((n, n))
-    longest = float(np.linalg.norm(F, axis=0).max())
-    excited = list[int]()
+    size = np.linalg.norm(F, axis=0)
+    least, excited = NEGLIGIBLE_COLUMN * float(size.max()), list[int]()
     for link in range(L):
         span = slice(TEN * link, TEN * (link + 1))
-        columns = F[:, span] @ to_ten
-        if (size := np.linalg.norm(columns, axis=0)).max() > NEGLIGIBLE_COLUMN * longest:
-            B[span, span] = to_ten * scales_of_entries(size, NEGLIGIBLE_COLUMN * longest)
+        lengths = np.linalg.norm(F[:, span] @ to_ten, axis=0)
+        if lengths.max() > least:
+            B[span, span] = to_ten * scales_of_entries(lengths, least)
             excited += range(span.start, span.stop)
-    others = np.arange(TEN * L, n)
-    size = np.linalg.norm(F[:, others], axis=0)
-    others, size = others[size > NEGLIGIBLE_COLUMN * longest], size[size > NEGLIGIBLE_COLUMN * longest]
-    B[others, others] = 1.0 / size
+    others = TEN * L + np.flatnonzero(size[TEN * L :] > least)
+    B[others, others] = 1.0 / size[others]
     seen = np.array([*excited, *others.tolist()])
-    links = len(excited) // TEN
-    bounded = np.flatnonzero(mechanism.positive[seen] & (np.arange(len(seen)) >= TEN * links))
-    return Cones(csc_array(B), seen, links, bounded)
+    bounded = np.flatnonzero(mechanism.positive[seen] & (seen >= TEN * L))
+    return Cones(csc_array(B), seen, len(excited) // TEN, bounded)
 
 
 def parameters_of_entries() -> Array:

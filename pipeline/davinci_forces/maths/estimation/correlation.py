@@ -29,8 +29,6 @@ WHITE = np.array([0.0, 0.03, 0.1, 0.3, 0.6])  # shares a of white noise in the v
 SINGLE, BANDS = 64, 120  # number of lowest frequencies with one band each, and of bands for all higher frequencies
 CACHED_ROWS = 8192  # rows that are processed together: they fit into the processor's cache
 SMALLEST = np.finfo(float).tiny
-
-
 Spectra = list[tuple[NDArray[np.complex128], int]]  # F (p + 1, K // 2 + 1) of columns and residuals, and K, per log
 
 

@@ -1,7 +1,4 @@
-"""Compiled loops of estimation.
-
-Import this module only where a loop runs: compiling it, or reading it back from the cache on disk, takes a moment.
-"""
+"""Compiled loops of estimation; imported where a loop runs, since compiling or loading them takes a moment."""
 
 from typing import Any
 

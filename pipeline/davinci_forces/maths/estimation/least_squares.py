@@ -6,8 +6,6 @@
 D holds the lengths of the weighted columns, so U has columns of unit length.  The triangular factor U contains all
 information of the data for least squares, with or without bounds.  A small singular value means that its column of B is
 a combination of parameters that hardly changes the effort, so the data determine this combination badly.
-
-Numbers of equations in this package are those of the thesis.
 """
 
 from typing import NamedTuple

@@ -245,10 +245,9 @@ def _joint_limits(joint: ExcitationProblem, bases: Sequence[Array]) -> tuple[Arr
 
 
 def _columns(Y: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None) -> Array:
-    """The selected columns (..., n, p) of F; Y is (..., n, 10 L), dq and ddq are (..., n).
+    """Columns (..., n, p) of the 10 L + 3 n of F: of Y (..., n, 10 L), then rotors, viscous and Coulomb friction.
 
-    The 10 L + 3 n columns are the inertial parameters of links, then rotors, viscous and Coulomb friction of joints.  A
-    width (n,) makes the friction smooth.
+    A width (n,) makes the friction smooth.
     """
     of_links = columns[columns < Y.shape[-1]]
     F = np.zeros((*dq.shape, len(columns)))

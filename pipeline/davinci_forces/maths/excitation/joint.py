@@ -143,8 +143,8 @@ def delay(z: Array, phase: Array) -> Array:
 def extremes(c: Array, period: float) -> tuple[Array, Array]:
     """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) with a mean of 0.
 
-    A parabola through each extreme of a grid and its neighbours gives the time of the extreme.  The error of that time
-    is of second order in the grid's step, and the error of the value is of fourth order.
+    A parabola through each extreme of a grid and its neighbours gives its time.  The error of the time is of second
+    order in the grid's step, that of the value of fourth order.
     """
     harmonics = c.shape[1] // 2
     grid = c @ _grid(period, harmonics)

@@ -51,15 +51,14 @@ def best_of_starts(
 
 
 def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[Array, float]:
-    """Evolve one population; return its best candidate (d,) and the objective there.
-
-    A collapsed population is spread around its best candidate, so that it also finds minima beyond a nearby jump.
-    """
+    """Evolve one population; return its best candidate (d,) and the objective there."""
     z = random.normal(size=(POPULATION * d, d))
     value = objective(z)
     for _ in range(GENERATIONS * d):
-        if value.max() <= value.min() + COLLAPSED:
-            z = _spread(z[value.argmin()], len(z), random)
+        if value.max() <= value.min() + COLLAPSED:  # finds minima beyond a nearby jump, too
+            size = 10 ** random.uniform(*SPREAD, size=(len(z), 1))
+            size[0] = 0.0  # the best candidate stays
+            z = np.asarray(z[value.argmin()] + size * random.normal(size=z.shape))
             value = objective(z)
         a, b = random.integers(len(z), size=(2, len(z)))
         moved = z[value.argmin()] + random.uniform(*STEP_FACTORS) * (z[a] - z[b])
@@ -68,10 +67,3 @@ def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[
         better = new < value
         z[better], value[better] = candidates[better], new[better]
     return z[value.argmin()], float(value.min())
-
-
-def _spread(best: Array, n: int, random: np.random.Generator) -> Array:
-    """A population (n, d) around the best candidate, which is its first member."""
-    size = 10 ** random.uniform(*SPREAD, size=(n, 1))
-    size[0] = 0.0
-    return np.asarray(best + size * random.normal(size=(n, len(best))))

@@ -11,6 +11,7 @@ With the inertial parameters of its links, a chain gives the `Tree` that the rec
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -187,23 +188,17 @@ def tree_of(chain: Chain, parameters: Array) -> Tree:
 
 def fold_fixed_links(chain: Chain, parameters: Array) -> tuple[Chain, Array]:
     """Merge links that do not move, and their inertial parameters (L, 10), into their parent links."""
-    pseudo, body, within, movable = pseudo_inertias(parameters), [0], [np.eye(4)], list[int]()
-    placement, merged = chain.placement.copy(), list[Array]()
-    for i, parent in enumerate(chain.parent):
+    moves = chain.coordinate != FIXED
+    pseudo, merged = pseudo_inertias(parameters), np.zeros((np.count_nonzero(moves) + 1, 4, 4))
+    body, within, placement = [0], [np.eye(4)], chain.placement.copy()
+    for i, (parent, link) in enumerate(zip(chain.parent, np.cumsum(moves), strict=True)):
         placement[i] = within[parent] @ chain.placement[i]
-        if chain.coordinate[i] != FIXED:
-            movable.append(i)
-            merged.append(pseudo[i])
-            body.append(len(movable))
-            within.append(np.eye(4))
-        else:
-            body.append(body[parent])
-            within.append(placement[i])
-            if body[parent]:
-                merged[body[parent] - 1] = merged[body[parent] - 1] + placement[i] @ pseudo[i] @ placement[i].T
+        body.append(link if moves[i] else body[parent])
+        within.append(np.eye(4) if moves[i] else placement[i])
+        merged[body[-1]] += within[-1] @ pseudo[i] @ within[-1].T
     folded = replace(
-        chain, links=tuple(chain.links[i] for i in movable), parent=np.array(body)[chain.parent[movable]],
-        placement=placement[movable], slides=chain.slides[movable], coordinate=chain.coordinate[movable],
+        chain, links=tuple(compress(chain.links, moves)), parent=np.array(body)[chain.parent[moves]],
+        placement=placement[moves], slides=chain.slides[moves], coordinate=chain.coordinate[moves],
         body=np.array(body)[chain.body], offset=np.array(within)[chain.body] @ chain.offset,
     )  # fmt: skip
-    return folded, of_pseudo_inertias(np.array(merged))
+    return folded, of_pseudo_inertias(merged[1:])

@@ -74,8 +74,6 @@ def _shift_or_turn(axis: Array, position: float, slides: bool) -> Array:
 def _z_along(axis: Array) -> Array:
     """A rotation (4, 4) whose z is an axis (3,) of length 1."""
     T = np.eye(4)
-    if np.array_equal(axis, Z):
-        return T
     x = np.eye(3)[int(np.abs(axis).argmin())]  # the coordinate axis that is most perpendicular to the joint axis
     x = x - (x @ axis) * axis
     x /= np.linalg.norm(x)

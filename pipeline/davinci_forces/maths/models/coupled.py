@@ -14,8 +14,9 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, BaseParameters, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks
 from davinci_forces.maths.mechanics.rigid_body import regressor
-from davinci_forces.maths.models.memory import PIECE_SAMPLES, efforts, friction_state
+from davinci_forces.maths.models.memory import efforts, friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor
 from davinci_forces.maths.models.terms import COULOMB, VISCOUS, Term
 
@@ -89,8 +90,7 @@ class CoupledArm:
 
     def inertia(self, theta: Array, q: Array) -> Array:
         """M (N, m, m) at q (N, n).  (4.38)"""
-        starts = range(0, max(len(q), 1), PIECE_SAMPLES)
-        return np.concatenate([self.inertia_columns(q[i : i + PIECE_SAMPLES]) @ theta for i in starts])
+        return evaluate_in_blocks(lambda block: self.inertia_columns(block) @ theta, q)
 
     def inertia_columns(self, q: Array) -> Array:
         """Derivatives (N, m, m, p) of M at q (N, n) by the parameters; M is linear in them."""

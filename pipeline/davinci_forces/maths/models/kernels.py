@@ -1,7 +1,4 @@
-"""Compiled parts of a model: the deflection of one sample, and along a motion.
-
-Import this module inside the function that uses it: to compile it or to load it from the cache on disk takes time.
-"""
+"""The deflection along a motion, compiled; imported where it is used, since that takes time."""
 
 from typing import Any
 

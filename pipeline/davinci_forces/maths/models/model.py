@@ -9,9 +9,8 @@ Parameters are combinations of masses, inertias and friction, none of which is n
 
     theta = A x,    J_l(x) >= 0 for every link l,    x_i >= 0 if physics determines the sign
 
-x are the ten inertial parameters of each link, then all other parameters of drives, cables and friction.  A link is
-physically possible if its pseudo-inertia J_l is positive semidefinite: its mass density is then nowhere negative, and
-the triangle inequalities hold.
+A link is physically possible if its pseudo-inertia J_l is positive semidefinite: its mass density is then nowhere
+negative, and the triangle inequalities hold.
 Traversaro, Brossette, Escande and Nori, Identification of fully physical consistent inertial parameters using
 optimization on manifolds, 2016.  Wensing, Kim and Slotine, 2018.  Of base parameters: Sousa and Cortesao, Physical
 feasibility of robot base inertial parameter identification: a linear matrix inequality approach, 2014.
@@ -27,7 +26,7 @@ from davinci_forces.maths.models.terms import Coefficients
 
 
 class Mechanism(NamedTuple):
-    """The dependence theta = A x of p parameters on n numbers of links, drives, cables and friction."""
+    """The dependence theta = A x of p parameters on n numbers of links, then drives, cables and friction."""
 
     matrix: Array  # A (p, n)
     links: int  # L; the first 10 L of x are inertial parameters, in the order of `bodies.PARAMETERS`

@@ -100,13 +100,12 @@ def reduced_parameters(
         raise ValueError(f"joint {joint} moving alone is not of the form of (6.8), (6.11) or (6.13)")
     rotor = 0.0 if drives is None else float(drives.inertia[joint])
     if slides:
-        values = {terms.lifted_mass.name: float(theta[0]), terms.inertia.name: float(M[0] - theta[0]) + rotor}
+        values = {terms.lifted_mass: theta[0], terms.inertia: M[0] - theta[0] + rotor}
     else:
-        gravities = {terms.gravity_sin.name: float(theta[0]), terms.gravity_cos.name: float(theta[1])}
-        values = {terms.inertia.name: float(M[0]) + rotor, **gravities}
+        values = {terms.inertia: M[0] + rotor, terms.gravity_sin: theta[0], terms.gravity_cos: theta[1]}
     if drives is not None:
-        values |= {terms.viscous.name: float(drives.viscous[joint]), terms.coulomb.name: float(drives.coulomb[joint])}
-    return values
+        values |= {terms.viscous: drives.viscous[joint], terms.coulomb: drives.coulomb[joint]}
+    return {term.name: float(value) for term, value in values.items()}
 
 
 @cache

@@ -1,7 +1,4 @@
-"""Parameters of motors, of their controllers, and of the haptic device.
-
-This module imports no compiled code, so that files with these parameters are read without loading a compiler.
-"""
+"""Parameters of motors, controllers and the haptic device, without compiled code, so that files are read quickly."""
 
 from typing import NamedTuple
 

@@ -1,8 +1,7 @@
 """A robot in closed loop: motors, motor drivers, controller, friction, end stops and surroundings.
 
 Time advances in ticks of the motor drivers.  At every n-th tick the controller reads the encoders and sets the drivers'
-commands, and a sample is recorded.  Between ticks the rigid body moves by one implicit step; the functions of its
-inertia, bias and tip are compiled.
+commands, and a sample is recorded.  Between ticks the rigid body moves by one implicit step.
 """
 
 from typing import Any, NamedTuple
@@ -80,13 +79,9 @@ def simulate(
     plant: Plant, body: JointConstraints, motors: Motors, law: Cascade | Regulator, timing: Timing, reference: Array,
     around: Surroundings, q: Array,
 ) -> Simulated:  # fmt: skip
-    """Run the closed loop from rest at q (n,).
-
-    `reference` (K, n) are the reference positions at the controller's K instants.
-    """
+    """Run the closed loop from rest at q (n,); `reference` (K, n) are positions at the controller's K instants."""
     K, n = reference.shape
-    out = Simulated(np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, 3)))
-    state = at_rest(q)
+    out, state = Simulated(*(np.zeros((K, width)) for width in (n, n, n, n, 3))), at_rest(q)
     run = _cascade if isinstance(law, Cascade) else _regulator
     run(plant, body, motors, law, timing, reference, around, state, out)
     return out
@@ -160,7 +155,10 @@ def _tick(
                 M[i, j] += around.mass * J[c, i] * J[c, j]
         free[i] = tau[i] - external[i]
     if tick == 0:
-        _record(state, tau, external, force, k, out)
+        for i in range(n):
+            out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
+        for c in range(3):
+            out.force[k, c] = force[c]
     step(M, b, free, body.friction, body.lower, body.upper, state, body.moving, h)
     if tick == 0 and around.mass > 0:  # add the effort and force of the mass's acceleration
         for i in range(n):
@@ -179,11 +177,3 @@ def _through(J: Any, dq: Any, velocity: Any) -> None:
         velocity[c] = 0.0
         for i in range(len(dq)):
             velocity[c] += J[c, i] * dq[i]
-
-
-@compile_function
-def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -> None:
-    for i in range(len(tau)):
-        out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
-    for c in range(3):
-        out.force[k, c] = force[c]

@@ -1,7 +1,4 @@
-"""The surroundings of a simulated robot: efforts at its joints, forces at its tip, a mass and tissue; and paths.
-
-The robot exerts these efforts and forces on its surroundings (7.8).
-"""
+"""The surroundings of a simulated robot, on which it exerts efforts and forces (7.8): a mass, tissue; and paths."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
