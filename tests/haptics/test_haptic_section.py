@@ -30,17 +30,21 @@ def read(record: Record) -> Record:
     return record
 
 
-def written(*records: Record) -> Section | None:
+def context(*records: Record) -> Context:
     catalogue = Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])
     study = Study(None, "A study", davinci.ROBOT, True, Settings(), ())
-    return haptics.section(Context(catalogue, study, collect(catalogue), Provenance("study", "1", {}, {}, {}, {})))
+    return Context(catalogue, study, collect(catalogue), Provenance("study", "1", {}, {}, {}, {}))
+
+
+def written(*records: Record) -> Section | None:
+    return haptics.section(context(*records))
 
 
 def test_contact_is_shaded_where_the_arm_presses():
-    spans = [mark for mark in haptics.spans(run()) if isinstance(mark, VSpan)]
-    assert [(span.start, span.end) for span in spans] == [(0.01, 3.15), (6.29, 9.43)]
-    [span] = haptics.spans(run(true_force=np.maximum(T - 5.0, 0.0)))  # to the last sample
-    assert (span.start, span.end) == (5.01, 9.99)
+    figures = [haptics.traces(context(each), each) for each in (run(), run(true_force=np.maximum(T - 5.0, 0.0)))]
+    spans, [last] = ([m for m in figure.panels[1].marks if isinstance(m, VSpan)] for figure in figures)
+    assert [(span.start, span.end) for span in spans] == [(0.01, 3.14), (6.29, 9.42)]
+    assert (last.start, last.end) == (5.01, 9.99)  # to the last sample
 
 
 def test_all_is_on_screen_only_and_says_that_it_is_simulated():

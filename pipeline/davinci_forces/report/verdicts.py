@@ -9,16 +9,8 @@ from scipy.special import bdtr
 
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import (
-    Contact,
-    FreeSpace,
-    LogSummary,
-    PathShare,
-    Prediction,
-    Stiffness,
-    TorqueConstant,
-    Weight,
-)
+from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
+from davinci_forces.records.weight import TorqueConstant, Weight
 from davinci_forces.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort

@@ -23,19 +23,17 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
         "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
         "is refitted without a sixth of the path, without half of it, and without each log if the others move as many "
         "joints together. Its score is the error on the data left out over the RMS effort, averaged over moving "
-        "joints; effort and prediction pass the same low-pass. With periods left out, the error measures how well a "
-        "model describes the path that it was fitted to: all periods follow this path, so extra parameters lower this "
-        "error even if they overfit. With blocks of path left out, on raw samples, the error measures what to expect "
-        "on a new path. This error is larger, and the model is chosen by it."
+        "joints; effort and prediction pass the same low-pass. With periods left out, extra parameters lower the error "
+        "even if they overfit, as all periods follow one path. With blocks of path left out, on raw samples, the error "
+        "is that to expect on a new path; the model is chosen by it."
     )
     yield Prose(
         "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
         "or the delay of the effort after the motion, adds one term, or changes the width or distance of one. It has "
         "to reduce the error on four or more of the six parts of the path. The model after the earliest step whose "
-        "error is within one standard error of the least is taken. Then joints share the links' parameters, unless "
-        "that is clearly worse; then each joint keeps its own (“joint by joint”). Of the candidates with fixed terms, "
-        "the simplest that is not clearly worse than the best is taken. The searched model replaces it if its error is "
-        "lower."
+        "error is within one standard error of the least is taken. Then joints share the links' parameters, or each "
+        "keeps its own (“joint by joint”) where sharing is clearly worse. Of the candidates with fixed terms, the "
+        "simplest that is not clearly worse than the best is taken, unless the searched model errs less."
     )
     why = choice.why.removeprefix(choice.chosen)  # the choice is named once
     it = "It" if why != choice.why else ""
@@ -80,10 +78,7 @@ def best_rows(choice: Choice) -> list[int]:
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of the candidates in these rows of a choice; the chosen one is bold."""
     header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Physical")
-    caption += (
-        " Relative errors: on blocks of path left out (raw samples), on the fitted data, and on periods left out. "
-        "Physical: whether the inertia is positive definite along the trajectories."
-    )
+    caption += " Errors are relative. Physical: whether the inertia is positive definite along the trajectories."
     cells = []
     for i in rows:
         name, physical = str(choice.candidate[i]), "yes" if choice.physical[i] else "no"

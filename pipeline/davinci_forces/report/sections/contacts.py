@@ -24,16 +24,16 @@ def section(context: Context) -> Iterator[Block]:
         yield Prose(
             "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is "
             "found there. Its window is stated in study.toml, or is the time in which the smoothed external effort "
-            "exceeds the alarm level, if the interval of the peak, without its flattening, does not hold zero. Free "
-            "motion like that of the logs crosses this level at most once in ten minutes. Onset and release are the "
-            "times at which the effort leaves zero and returns to it. Mean and impulse (mean times time) are those of "
-            "measured minus modelled effort, which no smoothing moves out of the window. The peak is the largest "
-            "external effort in the window, and at least the mean. Smoothing flattens it, a plateau not at all, and "
-            "the tip of a triangle most: half of what a tip would lose is added to the peak, and half to its error. "
-            "Standard errors are the spread over windows of the same length in free space; that of an impulse includes "
-            "those of onset and release if no window is stated, and that of a peak the smoother's standard deviation "
-            "there. Peaks are judged by the lower detection level: 99 % of the samples of the "
-            f"joint's worst run in free space stay below it. Alarm levels: {alarm_levels(context, contacts)}."
+            "exceeds the alarm level, which free motion crosses at most once in ten minutes, if the interval of the "
+            "peak, without its flattening, does not hold zero. Onset and release are the times at which the effort "
+            "leaves zero and returns to it. Mean and impulse (mean times time) are those of measured minus modelled "
+            "effort, which no smoothing moves out of the window. The peak is the largest external effort in the "
+            "window, and at least the mean. Smoothing flattens a plateau not at all, and the tip of a triangle most: "
+            "half of what a tip would lose is added to the peak, and half to its error. Standard errors are the spread "
+            "over windows of the same length in free space; that of an impulse includes those of onset and release if "
+            "no window is stated, and that of a peak the smoother's standard deviation there. Peaks are judged by the "
+            "lower detection level: 99 % of the samples of the joint's worst run in free space stay below it. Alarm "
+            f"levels: {alarm_levels(context, contacts)}."
         )
         yield peaks(context, contacts)
         yield from by_time(context, contacts)

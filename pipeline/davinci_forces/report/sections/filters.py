@@ -93,13 +93,10 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
     """Every log filtered as samples arrive, beside the smoother."""
     names = ("stream_delay", "free_rms", "stream_loss", "peak_ratio")
-    rows, named = [], set[str]()
+    rows = []
     for s in logs:
         of_log, prefix = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}"
-        of_joint: tuple[Cell, ...] = ("", "")  # once for all its logs
-        if s.joint not in named:
-            of_joint = context.number(f"{prefix}.alarm_level", 2), context.count(f"{prefix}.contacts_found")
-        named.add(s.joint)
+        of_joint = context.number(f"{prefix}.alarm_level", 2), context.count(f"{prefix}.contacts_found")
         rows.append((*run_cells(s)[::-1], *of_log, *of_joint))
     caption = (
         "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "

@@ -7,16 +7,9 @@ import numpy as np
 
 from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, literal
-from davinci_forces.report.content.marks import AnyMark, HBand, Line
+from davinci_forces.report.content.marks import AnyMark, Line
 from davinci_forces.report.context import Context, count, label
-from davinci_forces.report.sections.parts import (
-    autocorrelation,
-    converged_rows,
-    first_on_paper,
-    run_cells,
-    run_name,
-    section_of,
-)
+from davinci_forces.report.sections import parts
 
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
@@ -28,7 +21,7 @@ PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
-@section_of("Innovations", "innovations", Explanation)
+@parts.section_of("Innovations", "innovations", Explanation)
 def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The verdict on every run, figures of the worst run of each joint, and every test on demand."""
     yield Prose(
@@ -38,20 +31,20 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
         "combinations, until the tests pass. To remove contact or reversals, their samples are left out. The random "
         "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
-        "replaced by their maximum-likelihood estimate for this log. A cause is named as the whole cause if, "
-        "once it is removed, the tests pass with p-values at least a hundred times larger. They must fail if as many "
-        "samples are left out elsewhere. Of other causes the share of the correlation is stated. "
-        "The filter's random walk is chosen to follow pushes. In free motion this walk is larger than "
-        "necessary, so the innovations are slightly correlated. Bands, levels and standard errors of efforts do not "
-        "rest on white innovations, since they are calibrated on free motion.\n\n" + summary(explained)
+        "replaced by their maximum-likelihood estimate for this log. A cause is the whole cause if the tests then pass "
+        "with p-values at least a hundred times larger, and fail if as many samples are left out elsewhere. Of other "
+        "causes the share of the correlation is stated. The filter's random walk is chosen to follow pushes. In free "
+        "motion it is larger than necessary, so the innovations are slightly correlated. Bands, levels and standard "
+        "errors of efforts do not rest on white innovations, since they are calibrated on free motion.\n\n"
+        + summary(explained)
     )
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
     drawn = sorted((e for e in explained if (e.joint, e.log) in worst), key=lambda e: least_probability(e)[0])
     figures = [figure(context, e) for e in drawn]
-    yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
+    yield from parts.first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
-    causes = tuple(OnScreen(run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (trials(e),)) for e in explained)
+    causes = tuple(OnScreen(parts.run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (trials(e),)) for e in explained)
     yield OnScreen(f"The tested causes in {count(len(causes), 'run')}", "innovation-runs", causes)
 
 
@@ -66,7 +59,7 @@ def summary(explained: list[Explanation]) -> str:
 def verdicts(context: Context, explained: list[Explanation]) -> Table:
     """The verdict on every run, in words."""
     rows = tuple(
-        (*run_cells(e), *context.numbers(f"ekf.{e.log}.{e.joint}", ("nis_q", "nis_dq")), literal(e.verdict))
+        (*parts.run_cells(e), *context.numbers(f"ekf.{e.log}.{e.joint}", ("nis_q", "nis_dq")), literal(e.verdict))
         for e in explained
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
@@ -88,7 +81,7 @@ def tests(context: Context, explained: list[Explanation]) -> Table:
         key = f"ekf.{e.log}.{e.joint}"
         numbers = context.numbers(key, ("nis_mean", "acf1_q", "acf1_dq"), 2)
         white = context.probabilities(key, ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq"))
-        rows.append((*run_cells(e), *numbers, *white, context.number(f"{key}.clock_std", 2)))
+        rows.append((*parts.run_cells(e), *numbers, *white, context.number(f"{key}.clock_std", 2)))
     caption = (
         "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
         "autocorrelations (ACF); p-values of the Ljung-Box test and of the cumulative periodogram for white noise. "
@@ -107,7 +100,7 @@ def trials(e: Explanation) -> Table:
         p, explains = f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001", "●" if e.explains[i] else ""
         rows.append((literal(str(e.without[i])), str(e.left[i]), f"{e.walk[i]:.3g}", p, explains))
     caption = (
-        f"{run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
+        f"{parts.run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
         "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
     )
     header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
@@ -121,13 +114,13 @@ def least_probability(e: Explanation) -> Column:
 
 def figure(context: Context, e: Explanation) -> Figure:
     """Innovations over time, autocorrelation, cumulative periodogram, correlation with the motion.  Fig 7.9-7.11"""
-    name, about = run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
+    name, about = parts.run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
     white = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.select(Innovation, **about)}
     tested = [(white[field], of) for field, of in INNOVATION_FIELDS if field in white]
     panels = (
         *(over_time(t, *signal) for t in context.catalogue.select(Track, **about) for signal in INNOVATION_FIELDS),
-        *(autocorrelation(w, f"ACF, {of}", named=w is tested[0][0]) for w, of in tested),
+        *(parts.autocorrelation(w, f"ACF, {of}", named=w is tested[0][0]) for w, of in tested),
         *(periodogram(w, of) for w, of in tested),
         *(with_motion(moved[field], of) for field, of in INNOVATION_FIELDS if field in moved),
     )
@@ -146,7 +139,7 @@ def figure(context: Context, e: Explanation) -> Figure:
 
 def over_time(t: Track, field: str, of: str) -> Panel:
     """An innovation over time, once the filter has converged."""
-    shown = converged_rows(t.t)
+    shown = parts.converged_rows(t.t)
     marks = (Line(t.t[shown], getattr(t, field)[shown], "", "blue"),)
     return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
 
@@ -154,8 +147,7 @@ def over_time(t: Track, field: str, of: str) -> Panel:
 def periodogram(w: Whiteness, of: str) -> Panel:
     """A cumulative periodogram minus the straight line of white noise, with the bands of white noise."""
     marks: tuple[AnyMark, ...] = (
-        HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),
-        HBand(-w.periodogram_band, w.periodogram_band, ""),
+        *parts.white_bands(w.periodogram_band, w.periodogram_band_99),
         Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
     )
     return Panel(f"Periodogram, {of}", "frequency [1/sample]", "power above white", marks)
@@ -167,8 +159,7 @@ def with_motion(i: Innovation, of: str) -> Panel:
     # Both panels of a row show the same lines, so each legend names only some of them.
     names = ("velocity", "acceleration", "") if of == INNOVATION_FIELDS[0][1] else ("", "", "sign of velocity")
     marks: tuple[AnyMark, ...] = (
-        HBand(-i.band_99, i.band_99, "", "sky"),
-        HBand(-i.band, i.band, ""),
+        *parts.white_bands(i.band, i.band_99),
         Line(lag, i.with_dq, names[0], "blue", "solid"),
         Line(lag, i.with_ddq, names[1], "vermillion", "dashed"),
         Line(lag, i.with_sign, names[2], "green", "dotted"),

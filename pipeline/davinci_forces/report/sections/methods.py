@@ -10,7 +10,7 @@ from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import section_of, trust
+from davinci_forces.report.sections.parts import of_joint, section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
 SYMBOLS = (
@@ -94,8 +94,8 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
     (records.Track, (
         Prose("**Filtering.** The state holds position, velocity and external effort, the last as a random walk. At "
               "each sample the state is corrected with the measurement, and then predicted to the next sample. The "
-              "covariance is corrected in Joseph's form. The external effort is what the robot exerts on its "
-              "environment: a mass attached to a vertical slide gives a negative external effort."),
+              "covariance is corrected in Joseph's form. A mass attached to a vertical slide gives a negative external "
+              "effort, as the robot exerts it."),
         Equation('f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial '
                  "x), quad x_(k+1) = x_k + T_s f + 1/2 T_s^2 A f + w_k",
                  "the discrete model of position, velocity and external effort, to second order", "model"),
@@ -120,10 +120,9 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "deviation", "band"),
     )),
     (records.Threshold, (
-        Prose("**Detection.** A contact lasts while the smoothed effort (Bierman, 1973) exceeds the alarm level. This "
-              "is the larger of two: the largest effort in free motion, and the level that free motion like that of "
-              "the logs crosses once in ten minutes (Rice, 1944). The detection level of the tables is the 99 % "
-              "quantile of $abs(e)$."),
+        Prose("**Detection.** The alarm level of the smoothed effort (Bierman, 1973) is the larger of two: the largest "
+              "effort in free motion, and the level that free motion like that of the logs crosses once in ten minutes "
+              "(Rice, 1944). The detection level of the tables is the 99 % quantile of $abs(e)$."),
         Equation("cal(l) = max(max abs(e), sqrt(overline(e^2)) sqrt(2 ln(600 z_0)))",
                  "the alarm level: root mean square times the root of twice the logarithm of 600 s times the "
                  "crossing rate", "detection"),
@@ -143,8 +142,7 @@ METHODS: tuple[tuple[type[records.Record], tuple[Block, ...]], ...] = (
                  "the torque constant: the one in use times the known mass over the apparent one", "torque-constant"),
     )),
     (records.TissueModel, (
-        Prose("**Tissue.** Stiffness is the median slope of straight lines through the contacts of the pushes. There "
-              "are four laws: linear ($nu = 1$, where the damping is $B dot(d)$) or a power of depth, each with "
+        Prose("**Tissue.** There are four laws: linear ($nu = 1$, damping $B dot(d)$) or a power of depth, each with "
               "damping or without ($B = 0$). The simplest law is taken whose prediction of left-out pushes is not "
               "clearly worse than the best (Hunt and Crossley, 1975)."),
         Equation("F_T = F_0 + K_T d^nu + B d^nu dot(d)",
@@ -228,9 +226,9 @@ def unseen_score(context: Context, joint: str) -> str:
         level = f", level {context.number(f'{trusted.space.prefix}.detection_level', 2)}"
     model = context.used_fit(joint)
     if (used := context.used_record(joint)) is not None:
-        names = [str(name).removesuffix(f" of {joint}") for name in used.parameter]
-        friction = ", ".join(name for name in names if "friction" in name and " of " not in name)
-        model = f"{used.structure}, {len(used.theta)} parameters with {friction}, by {used.estimator}"
-    share = percent(trusted.share)
+        friction = ", ".join(name for name in of_joint(used, joint).values() if "friction" in name)
+        model = f"{used.structure}, {len(used)} parameters with {friction}, by {used.estimator}"
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
-    return f"{joint.replace('_', ' ')}: {model}; error {error} ({share} of the effort) on {where}{level}"
+    return (
+        f"{joint.replace('_', ' ')}: {model}; error {error} ({percent(trusted.share)} of the effort) on {where}{level}"
+    )

@@ -8,18 +8,8 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.maths.arrays import Booleans, evenly, runs
-from davinci_forces.records import (
-    Column,
-    Fit,
-    PathShare,
-    Prediction,
-    Record,
-    Residual,
-    TorqueConstant,
-    Track,
-    Weight,
-    Whiteness,
-)
+from davinci_forces.records import Column, Fit, PathShare, Prediction, Record, Residual, TorqueConstant, Track, Weight
+from davinci_forces.records.whiteness import Whiteness
 from davinci_forces.report.content import Block, Level, OnScreen, Panel, Section, Table, literal
 from davinci_forces.report.content.marks import AnyMark, Colour, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title
@@ -127,12 +117,16 @@ def effort_panel(record: Track | Prediction | Residual, *spans: VSpan, heading: 
     return Panel(heading, "time [s]", label(record, "tau", "effort"), marks)
 
 
+def white_bands(band: float, band_99: float, name: str = "", name_99: str = "") -> tuple[HBand, HBand]:
+    """The ranges in which 95 % and 99 % of white noise stay, the wider one first."""
+    return HBand(-band_99, band_99, name_99, "sky"), HBand(-band, band, name)
+
+
 def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:
     """An autocorrelation with the bands that white noise stays in; `named` in a legend."""
     acf = w.acf[1:]
-    names = ("99 % band", "95 % band") if named else ("", "")
-    bands = (HBand(-w.band_99, w.band_99, names[0], "sky"), HBand(-w.band, w.band, names[1]))
-    marks = (*bands, Stems(w.lag[1:].astype(float), acf, "", "blue"))
+    names = ("95 % band", "99 % band") if named else ("", "")
+    marks = (*white_bands(w.band, w.band_99, *names), Stems(w.lag[1:].astype(float), acf, "", "blue"))
     # The range shows small correlations apart from the band, and both sides of zero.
     reach = max(4 * w.band, 0.1)
     low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))

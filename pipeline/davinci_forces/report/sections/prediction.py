@@ -9,31 +9,21 @@ from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections import parts
 from davinci_forces.report.verdicts import is_out_of_log, percent
 
-LEFT_OUT = {
-    "validation": "never fitted",
-    "contact": "never fitted",
-    "leave one log out": "the log",
-    "leave one period out": "a period",
-    "leave a block of path out": "a block of path",
-    "leave a segment out": "a segment",
-}
-
 
 @parts.section_of("Prediction", "prediction", Prediction)
 def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
     yield Prose(
         "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
-        "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
-        "joint has more than 20 such logs, groups of successive logs are left out together. The chosen model is also "
-        "refitted without blocks of path and, if there are several logs, without each log. If a joint has one log "
-        "only, each of its periods is left out in turn. On the fitted path the fit absorbs part of the model's error, "
+        "windows, and identification logs. These are predicted by fits that leave out the log, or a group of "
+        "successive logs if a joint has more than 20, and by the chosen model also without blocks of path. Of a joint "
+        "with one log, each period is left out in turn. On the fitted path the fit absorbs part of the model's error, "
         "so scores there are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "both low-passed, after the noise variance is subtracted. "
-        "Samples at which the joint stands still are left out, as friction can then take any value. A contact log "
-        "whose windows the study does not state is scored with its contacts, so it is no worst run. A large error of "
-        "an identification log whose path is mostly new says that no other log replaces it, not that the fit is bad."
+        "both low-passed, after the noise variance is subtracted. Samples at standstill are left out, as friction can "
+        "then take any value. A contact log whose windows the study does not state is scored with its contacts, so it "
+        "is no worst run. A large error of an identification log whose path is mostly new says that no other log "
+        "replaces it, not that the fit is bad."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")
@@ -58,7 +48,8 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
     share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
-    how = LEFT_OUT.get(p.scheme, p.scheme.removeprefix("leave ").removesuffix(" out"))
+    is_fitted = p.role == "identification"
+    how = p.scheme.removeprefix("leave ").removesuffix(" out") if is_fitted else "never fitted"
     how = how if context.study.log(p.log).has_known_free_motion else f"{how}; contacts in it"
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
@@ -79,12 +70,16 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
 
 def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:
     """The worst model error of every fit, joint by joint."""
-    fits = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
     joints = context.joints_of(predictions)
-    if len(fits) < 2:
+    worst: dict[tuple[str, str], dict[str, Prediction]] = {(p.model, p.estimator): {} for p in predictions}
+    for joint in joints:
+        unseen = parts.of_free_motion(context, [p for p in predictions if p.joint == joint])
+        for p in sorted(unseen, key=lambda p: p.model_error):
+            worst[p.model, p.estimator][joint] = p
+    if len(worst) < 2:
         return
-    errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}
-    rows = tuple((fit_name(*fit), *cells) for fit, cells in errors.items() if any(cell != "–" for cell in cells))
+    keys = {fit: [f"{of[j].prefix}.model_error" if j in of else "" for j in joints] for fit, of in worst.items() if of}
+    rows = tuple((fit_name(*fit), *(context.number(key, 3) for key in of_fit)) for fit, of_fit in keys.items())
     caption = (
         "Every fit compared: its model error in the worst unseen run of each joint. Models: independent (each joint by "
         "itself) or coupled (the whole arm). Estimators: least squares (LSE), weighted (WLSE), total (TLS), bounded, "
@@ -92,15 +87,6 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
         "particle swarm (PSO)."
     )
     yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
-
-
-def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
-    """The model error of one fit in the worst run of a joint that was not fitted."""
-    of_joint = [p for p in predictions if p.joint == joint]
-    unseen = [p for p in parts.of_free_motion(context, of_joint) if (p.model, p.estimator) == (model, estimator)]
-    if not unseen:
-        return "–"
-    return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)
 
 
 def figure(context: Context, p: Prediction) -> Figure:

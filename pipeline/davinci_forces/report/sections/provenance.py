@@ -8,8 +8,6 @@ from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
 
-PER_LINE = 4  # settings
-
 
 @section_of("Provenance", "provenance")
 def section(context: Context) -> Iterator[Block]:
@@ -31,8 +29,7 @@ def section(context: Context) -> Iterator[Block]:
         "Settings used, defaults included. `harmonics` = 0 keeps those of the robot and of the motion, and `q_tau` = 0 "
         "takes the computed random walk; `effort` has the efforts that the study seeks:"
     )
-    settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
-    yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
+    yield Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items()))
     if study.changed:
         yield Prose("Changes of the robot:")
         yield Listing("\n".join(f"{name}: {in_words(value)}" for name, value in study.changed.items()))

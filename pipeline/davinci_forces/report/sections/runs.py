@@ -2,17 +2,8 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records import (
-    Diagnostic,
-    Explanation,
-    FilterNoise,
-    FreeSpace,
-    LogSummary,
-    Signal,
-    Track,
-    first_of_each_kind,
-)
-from davinci_forces.records.forces import SMOOTHER
+from davinci_forces.records import Diagnostic, Explanation, LogSummary, Signal, Track, first_of_each_kind
+from davinci_forces.records.forces import SMOOTHER, FilterNoise, FreeSpace
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
 from davinci_forces.report.context import Context, count, label

@@ -10,7 +10,7 @@ from davinci_forces.records import Column, TipBudget, TipContact, TipForce
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
-from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line, Line3D, Points3D, VSpan
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, Line, Line3D, Points3D, VSpan
 from davinci_forces.report.content.number import MINUS, Number
 from davinci_forces.report.context import Context, label, name_in_sentence
 from davinci_forces.report.sections.parts import converged_rows, section_of, strokes
@@ -18,7 +18,6 @@ from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 F = ("f_x", "f_y", "f_z")
 PATH_POINTS = 600  # points drawn of the path in space
-MAX_FORCES = 5  # drawn of a contact beside the largest
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
 
@@ -122,11 +121,11 @@ def log_blocks(
     """The figures of one log."""
     name = literal(force.log)
     yield Figure(
-        f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
+        f"{name}: force at the tip with its 95 % band."
         f"{' Windows of contact are shaded.' if contact is not None else ''} Where a joint stands still, its friction "
         "may take up any effort, so the band is wide.",
-        f"Components of the force at the tip over time in {name}, and the condition number of its poses.",
-        (*(component_panel(force, axis, contact) for axis in "xyz"), condition_panel(force)),
+        f"Components of the force at the tip over time in {name}.",
+        tuple(component_panel(force, axis, contact) for axis in "xyz"),
         f"tip-time-{force.log}",
         zoomable=True,
         height=32,
@@ -152,50 +151,31 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
     return Panel(f"Along {axis}0", "time [s]", label(force, f"f_{axis}", "force"), marks)
 
 
-def condition_panel(force: TipForce) -> Panel:
-    """The condition number of the Jacobian over time."""
-    near = bool(force.near_singular.any())
-    bound = (HLine(NEAR_SINGULAR, "near singular"),) if near else ()
-    marks = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"), *bound)
-    return Panel("Condition number of the Jacobian", "time [s]", "condition", marks, y_log=near)
-
-
 def in_space(force: TipForce, contact: TipContact) -> Figure3D:
-    """The path of the tip, with the force at each point in contact."""
+    """The path of the tip, with the largest force of each contact."""
     path = np.column_stack([force.x, force.y, force.z])
     extent = float(np.ptp(path, axis=0).max())
     per_newton = REACH * extent / float(contact.f_peak.max())
     few = evenly(len(path), PATH_POINTS)
-    at, f = contact_samples(force, contact)
     here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
     weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
     ends = here + per_newton * largest
     x, y, z = ends.T  # where numbers of contacts at one place are apart
     marks = (
         line(path[few], "path of the tip", "grey"),
-        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky"),
-        line(strokes(here, ends), "where it is largest", "vermillion", arrow=True),
+        line(strokes(here, ends), "largest force", "vermillion", arrow=True),
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
     )
     return Figure3D(
-        f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered in the "
-        f"order of [@tip-contacts]; 1 N is drawn {Number(1e3 * per_newton, 'mm', digits=2)} long. The black line at "
+        f"{literal(force.log)}: the path of the tip, and the largest force of each contact, numbered in the order "
+        f"of [@tip-contacts]; 1 N is drawn {Number(1e3 * per_newton, 'mm', digits=2)} long. The black line at "
         "its end is the 95 % interval along the least certain direction.",
-        f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
+        f"The path of the tip in space in {literal(force.log)}, with the largest force of each contact as an arrow.",
         marks,
         f"tip-space-{force.log}",
         height=88,
     )
-
-
-def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Column]:
-    """A few samples within each contact, and the forces there."""
-    f = np.column_stack([getattr(force, name) for name in F])
-    times = [np.linspace(start, end, MAX_FORCES + 2)[1:-1] for start, end in windows(contact)]
-    at = np.unique(np.clip(np.searchsorted(force.t, np.concatenate(times)), 0, len(f) - 1))
-    at = at[np.isfinite(f[at, 0])]
-    return at, f[at]
 
 
 def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line3D:

@@ -28,12 +28,11 @@ def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
         "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
-        "contact. Contact begins and ends at the kinks of the force-depth curve. A push is used if the line explains "
-        "90 % of its force beyond noise; the stiffness of a log is the median over the used pushes. The standard error "
-        "allows for correlated residuals, for tissue that differs from place to place, and for the worst effect of the "
-        "joint model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
-        "without delay. The filter's estimate is not used here, because it is delayed. Samples at rest are not used, "
-        "because friction can then take any value."
+        "contact, which begins and ends at the kinks of this curve. A push is used if the line explains 90 % of its "
+        "force beyond noise; the stiffness of a log is the median over the used pushes. The standard error allows for "
+        "correlated residuals, for tissue that differs from place to place, and for the worst effect of the joint "
+        "model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
+        "without delay. Samples at rest are not used, because friction can then take any value."
     )
     yield comparison(context, tissues)
     forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]

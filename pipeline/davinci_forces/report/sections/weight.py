@@ -7,7 +7,6 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Load, TorqueConstant, Weight
-from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
@@ -23,14 +22,13 @@ def section(context: Context) -> Iterator[Block]:
         return
     yield Prose(
         "A mass on a link adds gravity and inertia to the effort of the joints. The mass is estimated as the slope of "
-        "a line: the external effort of all moving joints that carry it, against the effort that 1 kg causes according "
-        "to the robot's chain. The external effort is measured minus modelled effort, low-passed without delay. Each "
-        "joint is weighted by the inverse of its model's squared error in free motion. A constant offset of the "
-        "effort, which differs from day to day (offset of the day), is estimated, too, if the data can separate it "
-        "from the load. The standard error combines the error of the fit with that of the run: by a jackknife over six "
-        "parts of the path, or by the spread between periods if that is larger. It is increased if logs without a mass "
-        "give a mass that its standard error does not explain, or if the masses that the joints give contradict each "
-        "other: by chance in less than one of a hundred cases."
+        "a line: the external effort of all moving joints that carry it (measured minus modelled, low-passed without "
+        "delay), against the effort that 1 kg causes according to the robot's chain. Each joint is weighted by the "
+        "inverse of its model's squared error in free motion. A constant offset of the effort, which differs from day "
+        "to day (offset of the day), is estimated, too, if the data can separate it from the load. The standard error "
+        "combines the error of the fit with that of the run: by a jackknife over six parts of the path, or by the "
+        "spread between periods if that is larger. It is increased if logs without a mass give a mass that it does not "
+        "explain, or if the joints contradict each other: by chance in less than one of a hundred cases."
     )
     if weights:
         yield summary(context, weights)
@@ -100,7 +98,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
         f"that of the robot's chain. In study.toml {TURN_AROUND}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
-        "unstated": f". The study states no mass, so none tests the scale of the efforts{scales(context, weight)}.",
+        "unstated": ". The study states no mass, so none tests the scale of the efforts: [@weight-table] has others.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
         f"{literal(worst_joint(weight))}, and where the mass hung.",
@@ -108,14 +106,6 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
-
-
-def scales(context: Context, weight: Weight) -> str:
-    """The scales that stated masses on the same joints give; "" if there are none."""
-    weights = [of for of in context.catalogue.records(Weight) if math.isfinite(of.stated_mass)]
-    of_same = [of.log for of in weights if [*of.loaded] == [*weight.loaded]]
-    found = [f"{context.number(f'weight.{log}.scale', 3)} by {literal(log)}" for log in of_same]
-    return f": this is {as_list(found)}, whose error is not in that of this mass" if found else ""
 
 
 def worst_joint(weight: Weight) -> str:

@@ -5,17 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import (
-    Diagnostic,
-    PathShare,
-    Prediction,
-    Record,
-    Spectrum,
-    Track,
-    Weight,
-    first_of_each_kind,
-)
-from davinci_forces.records.record import as_list
+from davinci_forces.records import Diagnostic, PathShare, Prediction, Record, Spectrum, Track, Weight
+from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import literal
 from davinci_forces.report.context import Context, title
