@@ -461,6 +461,22 @@ def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Cont
     assert "the positive direction of the instrument slide is not that of the robot's chain" in verdict.text
 
 
+def test_every_run_with_a_mass_has_a_table_of_its_joints_and_the_first_stands_on_paper(full: Context):
+    [of, *_] = full.catalogue.records(Weight)
+    weights = [replace(of, log=log) for log in (of.log, "second", "third")]
+    numbers = {
+        key.replace(f"weight.{of.log}.", f"weight.{weight.log}."): number
+        for weight in weights for key, number in full.results.items()
+    }  # fmt: skip
+    catalogue = Catalogue(lambda kind: weights if kind is Weight else full.catalogue.records(kind))
+    blocks = weight_section.section(replace(full, catalogue=catalogue, results=Results(numbers))).blocks
+    [others] = [block for block in blocks if isinstance(block, OnScreen)]
+    tables = [
+        [b.label for b in part if isinstance(b, Table) and "joints" in b.label] for part in (blocks, others.blocks)
+    ]
+    assert tables == [[f"weight-joints-{of.log}"], ["weight-joints-second", "weight-joints-third"]]
+
+
 def test_a_joint_of_one_parameter_has_no_correlation(full: Context):
     of = full.catalogue.select(Identifiability, group="hand_roll")[0]
     one = replace(of, **{name: getattr(of, name)[:1] for name in of.columns()})
