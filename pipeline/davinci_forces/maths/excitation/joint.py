@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, PERIOD_SAMPLES, Fourier, Range, basis, instants, ranges
-from davinci_forces.maths.excitation.search import ReportStart, minimise
+from davinci_forces.maths.excitation.search import ReportStart, best_of_starts, descend
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
@@ -72,7 +72,8 @@ def design(
         x = trajectories(problem, z)
         return CRITERIA[problem.criterion](regressor(problem.terms, *(x @ B for B in bases)))
 
-    best, values = minimise(objective, 1 + 2 * problem.harmonics, starts, seed, report_start)
+    size = 1 + 2 * problem.harmonics
+    best, values = best_of_starts(lambda random: descend(objective, size, random), starts, seed, report_start)
     if not np.isfinite(values).any():
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")

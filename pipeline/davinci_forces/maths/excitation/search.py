@@ -26,21 +26,15 @@ ReportStart = Callable[[int, int, float], None]  # takes the number of a start, 
 Result = TypeVar("Result")
 
 
-def minimise(
-    objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart | None = None
-) -> tuple[Array, Array]:
-    """Minimise from several starts: the best candidate (d,), and the lowest value of each start (starts,)."""
-    np.empty(RETAINED)
-    return best_of_starts(lambda random: descend(objective, d, random), starts, seed, report_start)
-
-
 def best_of_starts(
-    run: Callable[[np.random.Generator], tuple[Result, float]], starts: int, seed: int, report_start: ReportStart | None
-) -> tuple[Result, Array]:
+    run: Callable[[np.random.Generator], tuple[Result, float]], starts: int, seed: int,
+    report_start: ReportStart | None = None,
+) -> tuple[Result, Array]:  # fmt: skip
     """Search from several starts: the best result, and the optimum of each start (starts,).
 
     The first starts are the same for any number of starts.
     """
+    np.empty(RETAINED)
     results = []
     for start in range(starts):
         results.append(run(np.random.default_rng([seed, start])))

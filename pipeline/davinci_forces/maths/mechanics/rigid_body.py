@@ -47,14 +47,12 @@ def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | Non
 
 def gravity(chain: Chain, bodies: Bodies, q: ArrayLike) -> Array:
     """G (..., n): the effort that holds the arm still.  (4.38)"""
-    q = np.asarray(q, float)
-    return inverse_dynamics(chain, bodies, q, np.zeros_like(q), np.zeros_like(q))
+    return inverse_dynamics(chain, bodies, q, 0.0, 0.0)
 
 
 def coriolis(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array:
     """C dq (..., n): centrifugal and Coriolis efforts.  (4.38)"""
-    q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
-    return _newton_euler(moving_tree(chain, bodies, q.shape[-1]), 0.0, q, dq, np.zeros_like(q))
+    return _newton_euler(chain, bodies, 0.0, q, dq, 0.0)
 
 
 def coriolis_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array:
@@ -70,7 +68,7 @@ def coriolis_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -
 
 def forward_dynamics(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Array:
     """The acceleration ddq (..., n) that efforts tau cause, without contact.  (4.41)"""
-    bias = inverse_dynamics(chain, bodies, q, dq, np.zeros(np.shape(q)))
+    bias = inverse_dynamics(chain, bodies, q, dq, 0.0)
     M = mass_matrix(chain, bodies, q)
     return np.asarray(np.linalg.solve(M, (np.asarray(tau, float) - bias)[..., None])[..., 0])
 
@@ -89,9 +87,8 @@ def inverse_dynamics(
     chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, drives: Drives | None = None
 ) -> Array:
     """The effort tau (..., n) of this motion without contact.  (4.27), (4.28), (7.27)"""
-    q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
-    tau = _newton_euler(moving_tree(chain, bodies, q.shape[-1]), GRAVITY, q, dq, ddq)
-    return tau if drives is None else np.asarray(tau + drives.inertia * ddq + drives.friction(dq))
+    tau = _newton_euler(chain, bodies, GRAVITY, q, dq, ddq)
+    return tau if drives is None else tau + drives.inertia * np.asarray(ddq, float) + drives.friction(dq)
 
 
 def regressor(
@@ -140,7 +137,9 @@ def moving_tree(chain: Chain, bodies: Bodies, n: int) -> Tree:
     return tree_of(*fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10)))
 
 
-def _newton_euler(tree: Tree, g: float, q: Array, dq: Array, ddq: Array) -> Array:
+def _newton_euler(chain: Chain, bodies: Bodies, g: float, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+    q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
+    tree = moving_tree(chain, bodies, q.shape[-1])
     if _many(q):
         from davinci_forces.maths.mechanics import kernels
 
