@@ -202,5 +202,5 @@ def test_a_motion_within_its_limits_is_not_shrunk(six):
     up = Obstacles(floor=0.0)
     series = [Fourier.from_coefficients(np.r_[a0, np.full(10, 0.3)], 10.0) for a0 in (0.0, -1.2, 0.4, -0.8, 0.5, 0.0)]
     limits = problem_of(six, obstacles=up).limits
-    assert limits.present
+    assert limits.obstacles.present
     assert shrink_to_arm_limits(limits, series) == series

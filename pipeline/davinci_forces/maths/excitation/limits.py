@@ -63,11 +63,6 @@ class ArmLimits:
         """Whether efforts are limited and can be computed."""
         return self.parameters is not None and bool(np.isfinite(self.efforts).any())
 
-    @property
-    def present(self) -> bool:
-        """Whether anything is limited."""
-        return self.limits_effort or self.obstacles.present
-
     def excess(self, q: Array, Y: Array) -> Array:
         """The excess (..., m) over each limit at q (..., n) with regressor Y (..., n, 10 L); m = 0 without limits."""
         share = np.empty((*q.shape[:-1], 0))
@@ -88,6 +83,8 @@ class ArmLimits:
 
         Between two samples an excess is above theirs by no more than its largest change from sample to sample.
         """
+        if not (self.limits_effort or self.obstacles.present):
+            return True
         few = slice(None, None, STRIDE)
         if (self.excess(q[few], compiled_regressor(self.chain, q[few], dq[few], ddq[few])) > 0).any():
             return False
@@ -110,7 +107,7 @@ def shrink_to_arm_limits(limits: ArmLimits, series: Sequence[Fourier]) -> list[F
     def hold_at(scale: float) -> bool:
         return limits.hold(rest + scale * (q - rest), scale * dq, scale * ddq)
 
-    if not limits.present or hold_at(1.0):
+    if hold_at(1.0):
         return list(series)
     low, high = 0.0, 1.0
     for _ in range(SHRINKAGES):

@@ -37,10 +37,7 @@ def condition(J_v: ArrayLike) -> Array:
 
     Like the Jacobian, it mixes metres per radian with metres per metre.
     """
-    values = np.linalg.svd(np.asarray(J_v, float), compute_uv=False)
-    smallest = values[..., -1]
-    infinite = np.full(smallest.shape, np.inf)
-    return np.asarray(np.divide(values[..., 0], smallest, out=infinite, where=smallest > 0.0))
+    return np.asarray(np.linalg.cond(np.asarray(J_v, float)))
 
 
 def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:

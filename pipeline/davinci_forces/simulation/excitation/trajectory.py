@@ -194,7 +194,7 @@ def _run_in_samples(
     """The number of samples in the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
-    hold = limits.hold if limits and limits.present else None
+    hold = limits.hold if limits else None
     if duration := fourier.shortest_run_in([e.series for e in excitations], accelerations, durations, hold):
         return round(duration * rate)
     raise BadRequest(
