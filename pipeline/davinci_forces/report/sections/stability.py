@@ -84,7 +84,11 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
 
 
 def model(context: Context, limits: list[HandLimit]) -> str:
-    """State the assumed hands, and which of the limits are the same."""
+    """State the assumed hands, device, link and controller, and which of the limits are the same."""
+    haptics = context.study.haptics
+    late = MS * (haptics.position_delay + haptics.force_delay)
+    delay = f"{late:g} ms of delay" if late else "no delay"
+    scales = f"motion is scaled by {haptics.device.motion:g} and force by {haptics.device.force:g}"
     origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
     rows = [(x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits]
     apart = [max(row) / min(row) - 1.0 for row in rows if np.isfinite(row).all()]
@@ -95,20 +99,10 @@ def model(context: Context, limits: list[HandLimit]) -> str:
         "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
         "state the same limit: the formula takes the filter's lag and gain, from logs if there are any, at the "
         "frequency at which the hand would oscillate; the response and the simulation contain the filter itself. "
-        f"{agree}The last column of [@stability-table] says what each row includes. {assumptions(context)}"
-    )
-
-
-def assumptions(context: Context) -> str:
-    """State what the limits assume of the device, its link and the controller, none of which a log shows."""
-    haptics = context.study.haptics
-    late = MS * (haptics.position_delay + haptics.force_delay)
-    delay = f"{late:g} ms of delay" if late else "no delay"
-    scales = f"motion is scaled by {haptics.device.motion:g} and force by {haptics.device.force:g}"
-    return (
-        f"They also assume messages at {haptics.link_rate:g} Hz with {delay} but the wait for a message, and a "
-        f"controller at {haptics.rate:g} Hz; {scales}. State others, and other hands, in a scenario: `davinci-forces "
-        "haptics --template` prints one, with all that it assumes."
+        f"{agree}The last column of [@stability-table] says what each row includes. They also assume messages at "
+        f"{haptics.link_rate:g} Hz with {delay} but the wait for a message, and a controller at {haptics.rate:g} Hz; "
+        f"{scales}. State others, and other hands, in a scenario: `davinci-forces haptics --template` prints one, with "
+        "all that it assumes."
     )
 
 

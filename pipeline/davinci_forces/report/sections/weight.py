@@ -120,8 +120,7 @@ def turned_joint(weight: Weight) -> str:
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
     """The external effort of each joint and the effort of the mass.  Fig 7.12"""
-    mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
-    by = "estimated" if math.isnan(weight.stated_mass) else "stated"
+    mass, by = (weight.mass, "estimated") if math.isnan(weight.stated_mass) else (weight.stated_mass, "stated")
     offsets = dict(zip(weight.loaded, np.nan_to_num(weight.joint_offset), strict=True))
     name = literal(weight.log)
     subtracted = ", before the tare is subtracted and the model's error with it" if weight.tare else ""
