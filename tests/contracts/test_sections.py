@@ -729,14 +729,17 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     assert (
         told == " 1 A of a motor counts as 8.76 N m on the hand roll (by the robot’s description: check your drives)."
     )
-    alike = tuple(replace(joint, name=f"{joint.name}_{i}") for i in (1, 2) for joint in (drive,))
-    channels = tuple(Source(f"{joint.name}.i", "current", "current") for joint in alike)
-    overridden = {joint.name: {"torque_constant": 0.0438} for joint in alike}
-    both = replace(
-        full.study, changed=overridden, robot=replace(robot, joints=alike), logs=(replace(logs[0], channels=channels),)
-    )
-    told = opening.currents_in_words(replace(full, study=both))
-    assert told == " 1 A of a motor counts as 8.76 N m on the hand roll 1 and the hand roll 2."
+    for count, where in ((2, "the hand roll 1 and the hand roll 2"), (4, "each of 4 joints")):
+        alike = tuple(replace(drive, name=f"{joint.name}_{i}") for i in range(1, count + 1))
+        channels = tuple(Source(f"{joint.name}.i", "current", "current") for joint in alike)
+        study = replace(
+            full.study,
+            changed={joint.name: {"torque_constant": 0.0438} for joint in alike},
+            robot=replace(robot, joints=alike),
+            logs=(replace(logs[0], channels=channels),),
+        )
+        told = opening.currents_in_words(replace(full, study=study))
+        assert told == f" 1 A of a motor counts as 8.76 N m on {where}."
 
 
 def test_page_one_names_the_log_of_all_panels_and_peaks_once(full: Context):

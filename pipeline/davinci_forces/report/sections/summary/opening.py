@@ -102,7 +102,10 @@ def currents_in_words(context: Context) -> str:
     for joint in context.study.joints_by_current:
         factor = str(Number(joint.effort_per_ampere, joint.unit("{effort}"), digits=3))
         joints.setdefault(factor, []).append(name_in_sentence(joint.name))
-    factors = [f"{factor} on {as_list(names)}" for factor, names in joints.items()]
+    factors = [
+        f"{factor} on {as_list(names) if len(names) <= MAX_NAMED else f'each of {len(names)} joints'}"
+        for factor, names in joints.items()
+    ]
     stated = context.study.changed
     listed = [joint.name for joint in context.study.joints_by_current if joint.name not in stated]
     whose = " (by the robot’s description: check your drives)" if listed else ""
