@@ -14,7 +14,6 @@ from nptdms import ChannelObject, TdmsFile, TdmsWriter
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.text.stamps import clocks_may_change
 from davinci_forces.logs.timeline import ROUNDING, Timeline
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.reading import read, times_of
@@ -263,26 +262,3 @@ def test_lvm_columns_of_x_are_right_from_one_dated_write_to_the_next() -> None:
     log, samples = read(lvm(writes, Style(x_columns="Multi")))
     assert_allclose(times_of(log, "q", samples), [0, 0.1, 60, 60.1], rtol=1e-12)
     assert_allclose(times_of(log, "i", samples), [0.05, 0.25, 60.05, 60.25], rtol=1e-12)
-
-
-def test_local_starts_around_a_night_in_which_clocks_change_are_remarked_on() -> None:
-    for date, remarked in (("2026/03/29", True), ("2026/07/26", False)):
-        writes = [Write({"q": [1.0]}, x=[0.0], start=start, date=date) for start in ("01:59:00,0", "03:01:00,0")]
-        log, samples = read(lvm(writes))
-        assert_allclose(samples["elapsed"], [0, 3720])
-        assert any("clocks may have been put forward or back" in warning for warning in log.warnings) is remarked
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "may"),
-    [
-        ("2026-03-08T01:30:00", "2026-03-08T03:30:00", True),
-        ("2026-03-07T12:00:00", "2026-03-09T12:00:00", True),
-        ("2026-03-08T04:00:00", "2026-03-08T23:00:00", False),
-        ("2026-10-25T00:10:00", "2026-10-25T00:50:00", False),
-        ("2026-06-01T00:00:00", "2026-08-01T00:00:00", False),
-        ("2026-06-01T00:00:00", "2027-06-01T00:00:00", True),
-    ],
-)
-def test_clocks_change_on_sunday_nights_of_spring_and_autumn(before: str, after: str, may: bool) -> None:
-    assert clocks_may_change(before, after) is may

@@ -116,13 +116,6 @@ def test_parts_keep_the_clock_of_every_channel(tmp_path: Path) -> None:
     assert_allclose(times(log, "a/i"), [0, 0.02, 60, 60.02], rtol=1e-12)
 
 
-def test_a_night_in_which_clocks_change_between_two_parts_is_remarked_on(tmp_path: Path) -> None:
-    writes = [Write({"q": [1.0, 2.0]}, x=[0.0, 1.0], start=s, date="2026/03/29") for s in ("01:59:00,0", "03:01:00,0")]
-    log = open_parts(files(tmp_path, "lvm", *(lvm([write], Style(several=False)) for write in writes)), Options())
-    times(log, "q")
-    assert "part-1.lvm started after part-0.lvm, and times are local" in log.warnings[0]
-
-
 def test_files_side_by_side_keep_their_clocks_and_their_names(tmp_path: Path) -> None:
     (tmp_path / "q.csv").write_text("t,q\n0,1\n0.01,2\n0.02,3\n")
     (tmp_path / "i.csv.gz").write_bytes(gzip.compress(b"t,i\n0.005,4\n0.015,5\n"))

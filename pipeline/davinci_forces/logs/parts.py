@@ -13,7 +13,6 @@ import numpy as np
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
 from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, row_count, unique
-from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
 
@@ -22,11 +21,7 @@ ABSOLUTE = 1e9  # [s] a larger time counts from a fixed year, not from the start
 
 
 def open_parts(files: Sequence[Path], options: Options) -> Log:
-    """Open the files of a log, in order.
-
-    Raises BadLog if one cannot be read, has other channels than the first, is a copy, or started before its
-    predecessor.
-    """
+    """Open the files of a log; raises BadLog if one is unreadable, a copy, out of order, or has other channels."""
     require_different(files)
     opened = [open_log(file, options) for file in files]
     return opened[0] if len(opened) == 1 else Parts(opened)
@@ -72,9 +67,6 @@ class Parts(Log):
     def _place(self) -> None:
         """Give every clock of the parts a time channel, and check the starts."""
         _require_order(self.parts, self.starts)
-        for before, after in pairwise(self.parts):
-            if self.starts and before.zone == "local" and clocks_may_change(before.started, after.started):
-                self.remarks.append(f"{after.path.name} started after {before.path.name}, and {REMARK}")
         shared = _partition(self.parts[0])
         if any(_partition(part).keys() != shared.keys() for part in self.parts):
             raise self.bad(
@@ -122,7 +114,6 @@ class Parts(Log):
                     counts[name] = counts.get(name, 0) + count
 
     def _placed(self, axis: "_Axis", number: int, part: Log, names: Sequence[str], time: str) -> Iterator[Block]:
-        """Read the blocks of a part with their times on the common axis."""
         clock_channels = self.times[time]
         part_time = _partition(part)[clock_channels]
         others = [name for name in names if name != time]

@@ -13,7 +13,6 @@ from davinci_forces.logs.lines import Lines, decode
 from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.lvm.header import Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
-from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import OwnClock
 from davinci_forces.maths.arrays import Array, Booleans
 
@@ -36,7 +35,6 @@ class LvmLog(Log):
     clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the rows with a sample on the clock of these channels."""
         yield from read_ahead(Reading(self, names).blocks())
 
 
@@ -52,7 +50,7 @@ class Reading:
         written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
         first = tuple(name for name in written if name not in others) if others else ()
         self.together = (*self.own.channels, self.own.x) if self.own else first  # some have a sample in a row
-        self.say = Remarks(log.warnings)
+        self.kinds: Counter[str] = Counter()  # of remarks, without their numbers
         self.walk, self.lines = Walk(self.encoding, self.say), Lines(log.path, self.encoding)
         self.write = self.rows = self.rows_in_segment = self.back = 0
         self.went_back = ""
@@ -71,6 +69,13 @@ class Reading:
         except BadContent as problem:
             raise BadLog(f"{self.log.path}:{self.walk.line}: {problem}") from None
         self._close()
+
+    def say(self, remark: str) -> None:
+        """Add a warning; after the first few that differ only in their numbers, the others are counted."""
+        kind = DIGITS.sub("#", remark)
+        self.kinds[kind] += 1
+        if self.kinds[kind] <= MAX_REMARKS_OF_A_KIND:
+            self.log.warnings.append(remark)
 
     def _at_once(self, run: Run, lines: int) -> Cells | None:
         """Parse the cells of a run, or return None if it is no run: a header's tag in column 0 is not a number."""
@@ -107,7 +112,6 @@ class Reading:
         return sorted({0, *self._columns_of(run, self.names), *self._columns_of(run, self.together)})
 
     def _block(self, run: Run, cells: Cells) -> Block:
-        """Return the samples of a run by the names of their channels."""
         wanted = self._columns_of(run, self.names)
         block: Block = {name: cells.columns[i] for i, name in wanted.items()}
         empty = {name: cells.empty[i] for i, name in wanted.items() if i in cells.empty}
@@ -121,7 +125,9 @@ class Reading:
             if name in self.names:
                 block[name] = values
         if self.own and self.own.time in self.names:
-            block[self.own.time] = self._own_times(self.own, run, cells, before)
+            columns = self._columns_of(run, [self.own.x] if self.own.x else [])
+            own_x = next((cells.columns[i] for i in columns), None)
+            block[self.own.time] = self._since_start(run, own_x, cells.rows, before, self.own.channels[0])
         for name in set(self.names) - set(block):
             block[name], empty[name] = np.full(cells.rows, np.nan), np.ones(cells.rows, dtype=bool)
         self.rows += cells.rows
@@ -140,14 +146,7 @@ class Reading:
         masks = [np.ones(cells.rows, dtype=bool), *(cells.empty[i] for i in columns)]
         return np.asarray(~np.logical_and.reduce(masks))
 
-    def _own_times(self, clock: OwnClock, run: Run, cells: Cells, before: int) -> Array:
-        """Compute the times [s] since the start of the log of channels on another clock than the first."""
-        column = next(iter(self._columns_of(run, [clock.x])), None) if clock.x else None
-        x = None if column is None else cells.columns[column]
-        return self._since_start(run, x, cells.rows, before, clock.channels[0])
-
     def _look_at(self, run: Run, rows: int) -> None:
-        """Check the file segments, comments and decimal marks of a run."""
         ends = [*(row for row, _ in run.file_segments[1:]), rows]
         for (first, layout), end in zip(run.file_segments, ends, strict=True):
             if layout is not self.file_segment:
@@ -165,9 +164,6 @@ class Reading:
 
     def _begin_segment(self, layout: Layout) -> None:
         self._check_samples()
-        before = self.file_segment.started if self.file_segment else ""
-        if before and layout.started and clocks_may_change(before, layout.started):
-            self.say(f"line {layout.line}: {REMARK}")
         self.file_segment, self.rows_in_segment = layout, 0
         assert self.first is not None
         if absent := sorted(set(self.first.names) - set(layout.names)):
@@ -242,25 +238,6 @@ class Reading:
             say(f"line {lines.cut_at}: the file ends within this line, which is not used")
         for remark in lines.remarks():
             say(remark)
-        say.close()
-
-
-class Remarks:
-    """Collects warnings; after the first few that differ only in their numbers, the others are counted."""
-
-    def __init__(self, warnings: list[str]) -> None:
-        self.warnings = warnings
-        self.kinds: Counter[str] = Counter()
-
-    def __call__(self, remark: str) -> None:
-        """Add a warning."""
-        kind = DIGITS.sub("#", remark)
-        self.kinds[kind] += 1
-        if self.kinds[kind] <= MAX_REMARKS_OF_A_KIND:
-            self.warnings.append(remark)
-
-    def close(self) -> None:
-        """Add how many warnings were not listed."""
         for kind, count in self.kinds.items():
             if count > MAX_REMARKS_OF_A_KIND:
-                self.warnings.append(f"{count - MAX_REMARKS_OF_A_KIND} more times: {kind}")
+                self.log.warnings.append(f"{count - MAX_REMARKS_OF_A_KIND} more times: {kind}")

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
 from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, both_readings, number_in, split_cells
-from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
+from davinci_forces.logs.text.stamps import Unwrapped
 from davinci_forces.maths.arrays import Array
 
 NAMES = {delimiter: name for name, delimiter in NAMED.items() if name != "\\t"}
@@ -43,13 +42,12 @@ def read(path: Path, options: Options) -> Log:
         "header": f"{dialect.header} lines" if dialect.names else "none: columns are numbered from 0",
     }
     shown = dialect.channels[: len(dialect.channels) - dialect.has_trailing]
-    comments = list(dialect.preamble)
     time = next((channel.name for channel in shown if channel.kind == "time"), "")
     dated = next((stamps for stamps in dialect.stamps.values() if stamps.has_date), None)
     return TextLog(
         path, "text", shown, time=time, started=dated.first_moment if dated else "",
-        zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
-        encoding=options.encoding, warnings=list(dialect.remarks), unread=dialect.unread,
+        zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=list(dialect.preamble),
+        dialect=dialect, encoding=options.encoding, warnings=list(dialect.remarks), unread=dialect.unread,
     )  # fmt: skip
 
 
@@ -65,8 +63,6 @@ class TextLog(Log):
 
 
 class _Reading:
-    """One pass over the rows of a text."""
-
     def __init__(self, log: TextLog, dialect: Dialect, names: tuple[str, ...]) -> None:
         self.log, self.dialect, self.names = log, dialect, names
         self.width = len(dialect.channels)
@@ -75,7 +71,6 @@ class _Reading:
         self.wanted = sorted({*self.columns.values(), *behind})
         self.rows = self.narrow = self.first_narrow = self.no_rows = self.headers = self.first_header = 0
         self.times = {i: stamps.seconds for i, stamps in dialect.stamps.items() if i in self.wanted}
-        self.latest = 0.0  # [s] of columns with dates
         self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].has_date}
 
     def blocks(self) -> Iterator[Block]:
@@ -100,16 +95,12 @@ class _Reading:
             block = self._without_comments(first, block)
             cells = self._at_once(block, MISSING) or self._row_by_row(first, block)
         self.rows += cells.rows
-        for i in self.times.keys() - self.days.keys():
-            self.latest = max(self.latest, *cells.columns[i][-1:].tolist())
         for i, unwrapped in self.days.items():
             cells.columns[i] = unwrapped(cells.columns[i])
         nulls = {name: cells.nulls[i] for name, i in self.columns.items()}
         return self.log.count_nans({name: cells.columns[i] for name, i in self.columns.items()}, nulls)
 
     def _without_comments(self, first: int, block: bytes) -> bytes:
-        """Blank the comments between rows, and keep the first of them."""
-
         def blank(match: re.Match[bytes]) -> bytes:
             if match[0].strip():
                 self._comment(first + block.count(b"\n", 0, match.start()), decode(match[0], self.log.encoding))
@@ -188,7 +179,6 @@ class _Reading:
         return self.width == 1 and text not in self.dialect.header_lines
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
-        """Fill up the cells of a row to the number of columns."""
         width, trailing = self.width, self.dialect.has_trailing
         where = f"{self.log.path}:{line}: the row has {len(cells)} cells, but the log has {width - trailing} columns"
         if any(cells[width:]) or (trailing and NUMBERS[self.dialect.decimal].fullmatch("".join(cells[width - 1 :]))):
@@ -224,9 +214,5 @@ class _Reading:
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         if not self.rows:
             say("the file holds no complete row")
-        if self.latest and self.log.zone == "local":
-            ended = datetime.fromisoformat(self.log.started) + timedelta(seconds=self.latest)
-            if clocks_may_change(self.log.started, ended.isoformat()):
-                say(f"the log began at {self.log.started} and ended at {ended.isoformat()}: {REMARK}")
         for remark in lines.remarks():
             say(remark)

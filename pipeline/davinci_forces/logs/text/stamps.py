@@ -39,12 +39,6 @@ REWRITTEN: dict[re.Pattern[str], tuple[tuple[str, str], ...]] = {
     TIME_OF_DAY: ((r"^(\d\d?:)", r"1970-01-01 0\1"), (r" 0(\d\d:)", r" \1")),
 }  # fmt: skip
 DAY, HOUR = 86400.0, 3600.0  # [s]
-MONTHS = (3, 4, 9, 10, 11)  # in which clocks change in some country, on a Sunday night
-HOURS = (1, 2, 3)  # of these changes, in local time
-REMARK = (
-    "times are local, and between them lies a Sunday night on which clocks may have been put forward or back; if they "
-    "were, the times after it are wrong by an hour: record in UTC, or give the data after it as a separate log"
-)
 
 
 @dataclass(frozen=True)
@@ -150,15 +144,3 @@ class Unwrapped:
         later = t.copy()
         later[present] += DAY * days
         return later
-
-
-def clocks_may_change(before: str, after: str) -> bool:
-    """Whether clocks may have changed between two local times, in ISO 8601 without a zone."""
-    first, last = datetime.fromisoformat(before), datetime.fromisoformat(after)
-    sunday = (first - timedelta(days=(first.weekday() + 1) % 7)).replace(hour=0, minute=0, second=0, microsecond=0)
-    while sunday <= last:
-        changes = (sunday + timedelta(hours=hour) for hour in HOURS if sunday.month in MONTHS)
-        if any(first < change <= last for change in changes):
-            return True
-        sunday += timedelta(days=7)
-    return False
