@@ -19,17 +19,7 @@ from davinci_forces.logs.log import SAMPLED_KINDS, UNIT_OF_COUNTS, Block, Channe
 from davinci_forces.logs.parts import ABSOLUTE, require_different, starts_of
 from davinci_forces.logs.timeline import SKEW
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.clock import (
-    MAX_PERIOD_RATIO,
-    ClockStatistics,
-    are_gaps,
-    are_missing,
-    cubic,
-    distances,
-    flat_lowpass,
-    half_width,
-    longest_bridge,
-)
+from davinci_forces.maths.signals import clock as clocks
 
 FILLED_IN = "\n"  # name in a block of the flags of rows in which a missing sample was filled in: 1, else 0
 MIN_FLAG = 0.25  # an interpolated flag from which on a row is taken as filled in
@@ -45,10 +35,7 @@ def open_joined(files: Sequence[Path], options: Options) -> Log:
 
 
 class Joined(Log):
-    """Several logs recorded at the same time, each with its own clocks; channels are called `file/channel`.
-
-    The clocks count from the start of the first file if all files state their start, else from a common zero.
-    """
+    """Logs recorded together, with channels `file/channel`; clocks count from the first start if all state theirs."""
 
     def __init__(self, parts: Sequence[Log]) -> None:
         first = parts[0]
@@ -97,7 +84,6 @@ class Joined(Log):
         return twin
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read channels of one clock, which are therefore of one file."""
         self.warnings[:] = self.remarks
         stem = self.of[names[0]]
         part = self.parts[stem]
@@ -190,11 +176,9 @@ def _period(t: Array) -> float:
 
 @dataclass
 class _Rising:
-    """A clock whose times must increase."""
-
     whose: str
     refuse: Refuse
-    statistics: ClockStatistics = field(default_factory=ClockStatistics)
+    statistics: clocks.ClockStatistics = field(default_factory=clocks.ClockStatistics)
 
     def update(self, t: Array) -> None:
         """Check the next times."""
@@ -228,10 +212,10 @@ class Follower:
         self.waiting = self.t, self.x, 0  # samples of the low-pass, and how many of them are done
         following = self._next()
         self.period = _period(following[0]) if following else 0.0  # [s] median sampling time
-        if self.period > MAX_PERIOD_RATIO * period:
+        if self.period > clocks.MAX_PERIOD_RATIO * period:
             raise refuse(
-                f"{name} is sampled every {self.period:.4g} s, more than {MAX_PERIOD_RATIO:g} times as slow as the "
-                f"positions (every {period:.4g} s): too slow to interpolate; record it faster, or leave it out"
+                f"{name} is sampled every {self.period:.4g} s, more than {clocks.MAX_PERIOD_RATIO:g} times as slow as "
+                f"the positions (every {period:.4g} s): too slow to interpolate; record it faster, or leave it out"
             )
         ratio = period / self.period if self.period else 1.0
         self.ratio = ratio if ratio > MIN_RATIO_FILTERED else 1.0  # of sampling rates, if the faster is low-passed
@@ -243,12 +227,12 @@ class Follower:
         while not self.ended and not (len(self.t) > 1 and self.t[-2] > t[-1]):
             self._take(self._next())
         if np.isnan(self.within) and len(self.t):
-            apart = distances(self.t, t[(t >= self.t[0]) & (t <= self.t[-1])]) > SKEW * self.period
+            apart = clocks.distances(self.t, t[(t >= self.t[0]) & (t <= self.t[-1])]) > SKEW * self.period
             agree = len(apart) >= MIN_STAMPS_AGREEING and 1.0 - apart.mean() >= MIN_SHARE_AGREEING
             self.within = SKEW * self.period if agree else 0.0
-        x, exact, between = cubic(self.t, self.x, longest_bridge(self.period), t, self.within)
+        x, exact, between = clocks.cubic(self.t, self.x, clocks.longest_bridge(self.period), t, self.within)
         self.interpolated += int(np.count_nonzero(between))
-        filled = between & are_missing(self.t, t, self.period)
+        filled = between & clocks.are_missing(self.t, t, self.period)
         last = int(np.searchsorted(self.t, t[-1], side="right")) - 1
         begin = max(last - 1, 0)  # the slope at the last sample needs the sample before it
         self.t, self.x = self.t[begin:], self.x[begin:]
@@ -275,10 +259,11 @@ class Follower:
         """Low-pass the samples that wait and are followed by enough others, or by the end, between gaps."""
         before_t, before_x, done = self.waiting
         t, x = np.concatenate((before_t, t)), np.concatenate((before_x.reshape(-1, x.shape[1]), x))
-        reach = half_width(self.ratio)
+        reach = clocks.half_width(self.ratio)
         ready = len(t) if self.ended else max(len(t) - reach, done)
-        starts = np.flatnonzero(are_gaps(t, self.period)) + 1
-        smooth = np.concatenate([x[:0], *(flat_lowpass(part, self.ratio) for part in np.split(x, starts) if len(part))])
+        starts = np.flatnonzero(clocks.are_gaps(t, self.period)) + 1
+        between_gaps = (part for part in np.split(x, starts) if len(part))
+        smooth = np.concatenate([x[:0], *(clocks.flat_lowpass(part, self.ratio) for part in between_gaps)])
         begin = max(ready - reach, 0)
         self.waiting = t[begin:], x[begin:], ready - begin
         return t[done:ready], smooth[done:ready]

@@ -6,6 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -106,26 +107,15 @@ class SheetLog(Log):
     origin: datetime = datetime.min
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
-        place = {channel.name: i for i, channel in enumerate(self.channels)}
-        waiting: list[list[float]] = []
-        empty: list[list[bool]] = []
+        place = {channel.name: i for i, channel in enumerate(self.channels) if channel.name in names}
         with _book(self.path) as book:
-            for number, row in enumerate(book[self.sheet].iter_rows(values_only=True)):
-                if number < self.skipped or all(value is None for value in row):
-                    continue
-                cells = [row[place[name]] if place[name] < len(row) else None for name in names]
-                waiting.append([self._number(cell, number, name) for cell, name in zip(cells, names, strict=True)])
-                empty.append([cell is None or cell == "" for cell in cells])
-                if len(waiting) == BLOCK_ROWS_SHEET:
-                    yield self._block(names, waiting, empty)
-                    waiting, empty = [], []
-        if waiting:
-            yield self._block(names, waiting, empty)
-
-    def _block(self, names: Sequence[str], rows: list[list[float]], empty: list[list[bool]]) -> Block:
-        columns, missing = np.array(rows).T, np.array(empty).sum(axis=0)
-        block = {name: np.ascontiguousarray(column) for name, column in zip(names, columns, strict=True)}
-        return self.count_nans(block, dict(zip(names, missing.tolist(), strict=True)))
+            numbered = enumerate(book[self.sheet].iter_rows(values_only=True))
+            samples = ((i, row) for i, row in numbered if i >= self.skipped and any(v is not None for v in row))
+            while rows := list(islice(samples, BLOCK_ROWS_SHEET)):
+                cells = {name: [(i, row[k] if k < len(row) else None) for i, row in rows] for name, k in place.items()}
+                block = {name: np.array([self._number(cell, i, name) for i, cell in cells[name]]) for name in names}
+                missing = {name: sum(cell is None or cell == "" for _, cell in cells[name]) for name in names}
+                yield self.count_nans(block, missing)
 
     def _number(self, cell: Any, row: int, name: str) -> float:
         """Convert a cell to a number, NaN where it is empty."""

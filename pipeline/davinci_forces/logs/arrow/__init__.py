@@ -5,7 +5,7 @@ from pathlib import Path
 
 from davinci_forces.logs import isolated
 
-ARROW_BEGINNINGS = (b"PAR1", b"ARROW1\0\0", b"FEA1")
+ARROW_BEGINNINGS = (b"PAR1", b"ARROW1\0\0")
 read = partial(isolated.read, reader="davinci_forces.logs.arrow.table")
 
 

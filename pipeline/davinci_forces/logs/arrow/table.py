@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from pyarrow import feather, ipc, parquet
+from pyarrow import ipc, parquet
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
@@ -70,9 +70,6 @@ def _file(path: Path) -> tuple[pa.Schema, Batches]:
     if head == b"PAR1":
         table = parquet.ParquetFile(path, **PARQUET)
         return table.schema_arrow, lambda names: table.iter_batches(BATCH_ROWS, columns=list(names), use_threads=False)
-    if head == b"FEA1":
-        rows = feather.read_table(path, use_threads=False)
-        return rows.schema, lambda names: iter(rows.select(names).to_batches(BATCH_ROWS))
     return ipc.open_file(str(path)).schema, lambda names: _records(path, names)
 
 
@@ -99,11 +96,9 @@ def _unit(column: pa.Field) -> str:
 def _kind(what: pa.DataType) -> str:
     if pa.types.is_timestamp(what):
         return "time"
-    # A dictionary column holds labels, even if the labels are numbers.
-    of = pa.types
+    of = pa.types  # a dictionary column holds labels, even if the labels are numbers
     tests = (of.is_integer, of.is_floating, of.is_boolean, of.is_decimal, of.is_duration)
-    numeric = any(test(what) for test in tests)
-    return "number" if numeric else "text"
+    return "number" if any(test(what) for test in tests) else "text"
 
 
 @dataclass
