@@ -6,7 +6,7 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.log import Channel, Log, Options
+from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.units import unit_after_groups
 
 # Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
@@ -15,10 +15,7 @@ BAG = ("metadata.yaml", "*.db3", "*.mcap")  # files in a folder that is a log: a
 
 
 def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - frozen
-    """Open a log with the first format that recognises it.
-
-    Raises BadLog if the file is not there, is empty, or no format recognises it.
-    """
+    """Open a log with the first format that recognises it; raises BadLog if none does, or it is missing or empty."""
     if not path.exists():
         raise BadLog(f"{path}: there is no such file")
     inside = [file for pattern in BAG for file in sorted(path.glob(pattern))] if path.is_dir() else [path]
@@ -32,13 +29,9 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
         module = import_module(f"davinci_forces.logs.{name}")
         if options.dtype or module.recognises(path, head):
             log: Log = module.read(path, options)
-            log.channels = tuple(_with_unit(channel) for channel in log.channels)
+            log.channels = tuple(  # a name may state the unit
+                replace(c, unit=c.unit or unit_after_groups(c.name)) if c.kind == "number" and not c.derived else c
+                for c in log.channels
+            )
             return log
     raise BadLog(f"{path}: not a log of a known format ({', '.join(FORMATS)})")
-
-
-def _with_unit(channel: Channel) -> Channel:
-    """A channel with the unit that its name states, if the log states none."""
-    is_quantity = channel.kind == "number" and not channel.derived
-    unit = unit_after_groups(channel.name) if is_quantity and not channel.unit else ""
-    return replace(channel, unit=unit) if unit else channel

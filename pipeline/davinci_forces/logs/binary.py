@@ -28,10 +28,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def dtype_of(text: str) -> np.dtype[np.generic] | None:
-    """Parse the name of a number type, big-endian by default; None for an unknown name.
-
-    `float64`, `DBL` and `f8` are the same; a leading `<` means little-endian.
-    """
+    """Parse a number type, as `float64`, `DBL` or `f8`: big-endian without a leading `<`; None for an unknown name."""
     order, word = (text[0], text[1:]) if text[:1] in ("<", ">") else (">", text)
     code = TYPES.get(word.lower())
     return np.dtype(order + code) if code else None

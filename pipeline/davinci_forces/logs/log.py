@@ -74,11 +74,7 @@ class Clock:
 
 @dataclass
 class Log:
-    """An opened log.
-
-    `warnings`, `facts`, `comments` and the counts grow while its blocks are read and are complete at their end.
-    Reading the blocks again resets them.
-    """
+    """An opened log; reading its blocks resets its `warnings`, `facts`, `comments` and counts, and completes them."""
 
     path: Path
     format: str  # the name of the module that reads it
@@ -120,10 +116,7 @@ class Log:
         return BadLog(f"{self.path}: {problem}")
 
     def find(self, name: str | int) -> Channel:
-        """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
-
-        Raises BadLog if there is none, or more than one; the message lists the closest.
-        """
+        """Find a channel by name, a unique last part of it, or its number from 0; raises BadLog with the closest."""
         if isinstance(name, int):
             written = [channel for channel in self.channels if not channel.derived]
             if not 0 <= name < len(written):
@@ -145,10 +138,7 @@ class Log:
         raise self.bad(f"there is no channel {name!r} among its {len(names)}; {hint}")
 
     def times_called(self, name: str | int) -> list[Channel]:
-        """List the time channels that a study means by a name: one, or one of that name in each group of channels.
-
-        Raises BadLog if there is none.
-        """
+        """List the time channels of a name: one, or one in each group of channels; raises BadLog if there is none."""
         if isinstance(name, int):
             return [self.find(name)]
         last = name.rpartition("/")[2]
@@ -216,15 +206,6 @@ def unique(names: Sequence[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
             free = f"{name}_{number}"
         used[free] = None
     return tuple(used)[len(used) - len(names) :]
-
-
-def renaming_remarks(written: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Describe the channels that had to be renamed because their name was taken."""
-    return [
-        f"more than one column is called {original!r}; column {i} is read as {name!r}"
-        for i, (original, name) in enumerate(zip(written, names, strict=True))
-        if original and original != name
-    ]
 
 
 def read_ahead(blocks: Iterator[Block]) -> Iterator[Block]:

@@ -27,8 +27,7 @@ HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hol
 def read(path: Path, options: Options, reader: str, package: str = "") -> Log:
     """Open a log in a child process; `reader` is a module that exports `open_in_child(path) -> Log`.
 
-    It may need an optional package, which not every installation has.  Raises BadLog if that package is not installed,
-    or the log cannot be read within the limits.
+    Raises BadLog if the package that it needs is not installed, or the log cannot be read within the limits.
     """
     if package and find_spec(package) is None:
         raise BadLog(f"{path}: {package}, which reads it, is not installed; run: {install(package)}")

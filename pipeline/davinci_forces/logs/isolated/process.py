@@ -142,10 +142,7 @@ def close_all() -> None:
 
 @contextmanager
 def block_interrupts(*also: signal.Signals) -> Iterator[None]:
-    """Start processes that ignore Ctrl-C, which a terminal sends to all: their parent ends them.
-
-    Other signals that are named wait meanwhile, too.
-    """
+    """Start processes that ignore Ctrl-C, because their parent ends them; the signals `also` wait meanwhile, too."""
     if sys.platform == "win32":
         yield
         return

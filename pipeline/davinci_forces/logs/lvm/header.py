@@ -99,12 +99,9 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)
     measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
     _check(tags, len(measured), line, remarks)
-    units = [""] * len(names)
-    unit_labels = tags.get("Y_Unit_Label", [])
-    for i in measured:
-        units[i] = unit_labels[i - 1] if i <= len(unit_labels) else ""
     x_unit = _first(tags, "X_Unit_Label") or "s"
-    units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
+    unit_of = (x_unit if _is_x(i, file) else _cell(tags, "Y_Unit_Label", i) for i in range(len(names)))
+    units = [unit if name else "" for name, unit in zip(names, unit_of, strict=True)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
     start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
     if not started:

@@ -81,7 +81,6 @@ class Variable:
         return values
 
     def __getitem__(self, part: Any) -> Any:
-        """Read a part of it."""
         return self.values[part]
 
 

@@ -200,7 +200,6 @@ class BagLog(Log):
             raise self.bad(f"message {number} of {topic.name} {how}; record these separately") from None
 
     def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
-        """The samples of a channel in messages of one layout."""
         quantity = name.removeprefix(f"{topic.name}/")
         if quantity == "stamp" and layout.stamp:
             return (stamps_at(layout.stamp, table) - self.origin) / 1e9
@@ -213,7 +212,6 @@ class BagLog(Log):
         )
 
     def _drop(self, topic: Topic, layout: Layout, number: int, count: int) -> None:
-        """Leave out messages of other joints."""
         if not self.dropped:
             others = f"message {number} of {topic.name} is of other joints ({', '.join(layout.joints)})"
             self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")

@@ -106,8 +106,6 @@ def _holder(fields: Sequence[Any]) -> str:
 
 
 class _Walk:
-    """One pass over the bytes of a message."""
-
     def __init__(self, content: bytes, types: Any, ros1: bool) -> None:
         if not ros1 and content[:2] not in ENCODINGS:
             raise BadContent(f"is encoded as {content[:2].hex()}, which is not plain CDR")

@@ -186,7 +186,6 @@ def _joined(contents: Sequence[bytes]) -> tuple[Integers, Table]:
 
 
 def _unpacked(batch: Batch) -> Batch:
-    """Decompress each message."""
     rows = np.arange(len(batch.times))[:, None]
     return Batch(batch.owners, batch.times, *_joined([decompress(batch.table(row).tobytes()) for row in rows]))
 

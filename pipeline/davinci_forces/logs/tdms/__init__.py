@@ -98,7 +98,6 @@ class TdmsLog(Log):
         yield from read_ahead(self._timed(names))
 
     def _timed(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        """Add derived times to the blocks."""
         timelines = {name: self.made[name] for name in asked_for if name in self.made}
         written = [name for name in asked_for if name not in timelines]
         row = 0
@@ -142,7 +141,6 @@ def _rows(timelines: Mapping[str, Timeline]) -> Iterator[Block]:
 
 
 def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
-    """Set what the properties and the file segments state about the log."""
     properties, latest = walk.objects.properties, walk.objects.latest
     log.facts["segments"] = str(walk.file_segments)
     log.facts["layout"] = ", ".join(sorted(walk.layouts))
@@ -203,7 +201,5 @@ def _describe_time(
 
 def _first_second(file: BinaryIO, index: Index, path: str) -> int | None:
     """Return the whole second since 1904 of a channel's first time stamp."""
-    for piece in pieces(file, index.regions(path), [path], 0):
-        if len(piece[path]):
-            return int(np.floor(piece[path][0]))
-    return None
+    stamps = (piece[path] for piece in pieces(file, index.regions(path), [path], 0))
+    return next((int(np.floor(times[0])) for times in stamps if len(times)), None)

@@ -47,10 +47,7 @@ def set_clocks(log: Log, sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
 
 
 def _shared(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> dict[str, str]:
-    """Map each channel to the first channel on its clock, or to "" if that is unknown.
-
-    `ends_anywhere` marks a truncated file, in which lengths prove nothing.
-    """
+    """Map each channel to the first on its clock, "" if unknown; lengths prove nothing if the file `ends_anywhere`."""
     stamps: dict[str, str] = {}
     for name, s in sampled.items():
         if s.is_stamps:
@@ -78,7 +75,6 @@ def _names(clocks: Sequence[str], channels: Sequence[Channel], sampled: Mapping[
 
 
 def _longest(clock_of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
-    """Return the longest timeline of each clock."""
     longest: dict[str, Timeline] = {}
     for name, clock in clock_of.items():
         timeline = sampled[name].timeline
@@ -118,10 +114,7 @@ class Waveforms:
         return next(starts, None)
 
     def timelines(self, zero: datetime | None, properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Timeline]:
-        """Compute the timelines by path, counted from `zero`; untimed channels are omitted.
-
-        Properties may be written after samples; samples before any properties take the first ones.
-        """
+        """Compute the timelines by path, counted from `zero`, where timed; the first properties hold from the start."""
         timelines = {}
         for path, writes in self.writes.items():
             first = next((words for _, words in writes if words), None) or _words(properties.get(path, {}))

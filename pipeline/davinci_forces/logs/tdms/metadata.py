@@ -72,8 +72,6 @@ class Objects:
 
 
 class _Cursor:
-    """Reads consecutive values from bytes."""
-
     def __init__(self, data: bytes, order: str) -> None:
         self.data, self.order, self.at = data, order, 0
 

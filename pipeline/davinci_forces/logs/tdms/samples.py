@@ -74,10 +74,7 @@ def rows_of(channels: int) -> int:
 
 
 def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: int) -> Iterator[Block]:
-    """Read the samples of channels of one group, which have equally many samples in every region.
-
-    `origin` is the zero of time stamps, in seconds since 1904.
-    """
+    """Read the samples of channels of one group; `origin` is the zero of time stamps, in seconds since 1904."""
     for region in regions:
         columns = {path: region.columns[path] for path in paths if path in region.columns}
         if not columns:
@@ -89,7 +86,6 @@ def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], orig
 
 
 def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Read many complete records at a time."""
     most = max(column.count for column in columns.values())
     many = max(1, min(BLOCK // region.stride, PIECE_ROWS // most))
     begin = min(column.offset for column in columns.values())

@@ -94,7 +94,6 @@ class Walk:
         return self.file.read(length)
 
     def _stop(self, at: int, lead: bytes) -> None:
-        """Warn why the walk ends here."""
         size = self.size - at
         if not lead.strip(b"\0"):
             self.say(f"byte {at}: {size} NUL bytes follow, typical of a power cut; they are not read")
@@ -177,7 +176,6 @@ class Walk:
 def _regions(
     active: dict[str, Samples], order: str, interleaved: bool, data: int, length: int, whole: bool
 ) -> Iterator[Region]:
-    """Yield the regions of the raw data of one file segment."""
     if interleaved:
         yield from _interleaved(active, order, data, length)
         return

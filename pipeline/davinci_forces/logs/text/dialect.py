@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.logs.cells import MISSING
-from davinci_forces.logs.log import BadContent, Channel, Options, renaming_remarks, unique
+from davinci_forces.logs.log import BadContent, Channel, Options, unique
 from davinci_forces.logs.text.marks import find_marks
 from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, both_readings, split_cells
 from davinci_forces.logs.text.stamps import Stamps, both_dates, stamps_of
@@ -82,7 +82,9 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     if options.header is None and _are_numbers_of_columns(split_cells(lines[first], delimiter), columns, decimal):
         first, options = first + 1, replace(options, header=True)
     header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, options)
-    stamps = _from_first_row(stamps, [split_cells(line, delimiter) for line in lines[first:]], len(kinds))
+    whole = [row for line in lines[first:] if len(row := split_cells(line, delimiter)) == len(kinds)]
+    counted_from = {i: stamp.from_first([row[i] for row in whole]) for i, stamp in stamps.items()}
+    stamps = {i: stamp for i, stamp in counted_from.items() if stamp}  # a column without a valid first date is text
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
     unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := _why_text(columns[i]))}
     unitless = [i for i, kind in enumerate(kinds) if kind == "number" and not header.units[i]]
@@ -93,6 +95,11 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     ]
     described = zip(unique(header.names), units, kinds, aliases, strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
+    renamed = (
+        f"more than one column is called {written!r}; column {i} is read as {channel.name!r}"
+        for i, (written, channel) in enumerate(zip(header.names, channels, strict=True))
+        if written and written != channel.name
+    )
     remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in unread.items()}
     return Dialect(
         delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
@@ -100,7 +107,7 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
         names=tuple(header.names) if any(header.names) else (), preamble=tuple(header.preamble), framed=framed,
         quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])),
         unread={channels[i].name: remarks[i] for i in unread},
-        remarks=(*renaming_remarks(header.names, [channel.name for channel in channels]), *remarks.values()),
+        remarks=(*renamed, *remarks.values()),
     )  # fmt: skip
 
 
@@ -140,18 +147,10 @@ def _columns(body: list[str], delimiter: str) -> list[tuple[str, ...]]:
     return [*zip(*(row for row in rows if len(row) == width), strict=True)]
 
 
-def _from_first_row(stamps: dict[int, Stamps], rows: Sequence[Sequence[str]], width: int) -> dict[int, Stamps]:
-    """Count times from the first row; a column whose first date is not valid is text."""
-    cells = {i: [row[i] for row in rows if len(row) == width] for i in stamps}
-    from_first = {i: each.from_first(cells[i]) for i, each in stamps.items()}
-    return {i: each for i, each in from_first.items() if each}
-
-
 def _first_row(
     lines: Sequence[str], delimiter: str, kinds: Sequence[str], number: re.Pattern[str], stamps: dict[int, Stamps],
     options: Options,
 ) -> int:  # fmt: skip
-    """Count the lines before the first row."""
     filled = [i for i, line in enumerate(lines) if line.strip()]
     if options.header is not None:
         return filled[0] + options.header
@@ -213,10 +212,7 @@ def _why_text(cells: Sequence[str]) -> str:
 
 
 def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options) -> Header:
-    """Read the lines before the first row; `columns` are the cells of the columns below.
-
-    Raises BadContent if the last line has other columns than the rows, or holds numbers and text.
-    """
+    """Read the lines above `columns` of cells; raises BadContent if the last has other columns, or numbers and text."""
     width = len(columns)
     rows = [_fitted(line, columns, delimiter) for line in lines]
     fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
