@@ -20,7 +20,7 @@ from tests.logs.reading import read
 
 CELLS = st.none() | st.floats(width=64)
 NAMES = st.text(st.characters(blacklist_categories=("C", "Z"), blacklist_characters="\t;,\r\n"), min_size=1, max_size=8)
-NO_CHANNEL = {"X_Value", "Comment", "write", "elapsed"}
+NO_CHANNEL = {"X_Value", "Comment", "elapsed"}
 
 
 @st.composite
@@ -105,7 +105,6 @@ def test_a_blank_line_in_a_block_of_rows_is_noticed(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(lvm_walk, "LINEWISE_BYTES", 64)
     log, samples = read(content.replace(b"\n300,0\t", b"\n\n300,0\t"))
     assert_array_equal(samples["a"], rows)
-    assert_array_equal(samples["write"], np.repeat([1, 2], [300, 100]))
     assert log.warnings == ["line 324: rows continue after a blank line without a header; they are read as before"]
 
 
@@ -128,10 +127,10 @@ def test_half_a_letter_at_the_end_is_told_of() -> None:
     assert (log.dropped, log.warnings) == (1, ["line 24: the file ends within this row, which is dropped"])
 
 
-def test_writes_are_numbered_where_x_restarts_without_a_header() -> None:
+def test_rows_where_x_restarts_without_a_header_are_kept_and_told_of() -> None:
     writes = [Write({"a": [1.0, 2.0]}, x=[0.0, 0.01]) for _ in range(4)]
     log, samples = read(lvm(writes, Style(several=False)))
-    assert_array_equal(samples["write"], [1, 1, 2, 2, 3, 3, 4, 4])
+    assert_array_equal(samples["a"], [1, 2] * 4)
     assert "goes back from 0.01 to 0 in row 3 (the first of 3 times)" in log.warnings[0]
 
 
@@ -139,7 +138,6 @@ def test_a_loop_that_writes_one_sample_per_call_keeps_every_row() -> None:
     writes = [Write({"a": [float(i)]}, x=[0.0]) for i in range(50)]
     log, samples = read(lvm(writes, Style(several=False)))
     assert_array_equal(samples["a"], np.arange(50))
-    assert_array_equal(samples["write"], np.arange(1, 51))
     assert "x stands still at 0 in row 2 (the first of 49 times)" in log.warnings[0]
 
 
@@ -170,7 +168,7 @@ def test_an_interval_that_lost_its_digits_is_told_of() -> None:
 def test_what_recurs_is_told_of_a_few_times_and_counted() -> None:
     writes = [Write({"a": [1.0]}, x=[0.0], samples=2) for _ in range(20)]
     log, samples = read(lvm(writes))
-    assert_array_equal(samples["write"], np.arange(1, 21))
+    assert_array_equal(samples["a"], np.ones(20))
     assert log.warnings[-1] == "15 more times: line #: the header states # samples, but # rows follow; these are read"
     assert len(log.warnings) == 6
 

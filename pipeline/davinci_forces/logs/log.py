@@ -59,7 +59,7 @@ class Channel:
     name: str
     unit: str = ""
     kind: str = "number"  # or "text", "time"; channels that are not quantities are listed, too
-    derived: bool = False  # computed by the reader, not in the file ("write", "elapsed")
+    derived: bool = False  # computed by the reader, not in the file ("elapsed")
     time: str = ""  # the channel of its sample times; "" for the clock of the log: `Log.time`, else `Log.clock`
     alias: str = ""  # another name that `find` accepts: a joint's name for its number, or another spelling
 

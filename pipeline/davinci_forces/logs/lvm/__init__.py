@@ -49,12 +49,12 @@ def _opened(path: Path, options: Options, walk: Walk) -> LvmLog:
     names = [channel.name for channel in written]
     has_x = any(layout.file.x_columns != "No" for layout in layouts)
     dated = walk.file_segments > 1 and first.start is not None
-    derived = unique(("write", "elapsed"), names)[: 1 + dated]
+    elapsed = unique(["elapsed"], names)[:dated]
     clock = None if has_x or dated or first.step is None else Clock(first.step, first.x0)
     warnings = [_rounded(first)] if clock and _rounded(first) else []
-    new = (Channel(name, "s" * (i == 1), derived=True) for i, name in enumerate(derived))
+    new = (Channel(name, "s", derived=True) for name in elapsed)
     log = LvmLog(
-        path, "lvm", channels=(*written, *new), clock=clock, time=derived[1] if dated else X if has_x else "",
+        path, "lvm", channels=(*written, *new), clock=clock, time=elapsed[0] if dated else X if has_x else "",
         started=first.started, zone="local" if first.started else "", facts=_facts(first, walk), warnings=warnings,
         options=options,
     )  # fmt: skip

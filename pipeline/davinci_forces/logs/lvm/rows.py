@@ -26,9 +26,8 @@ DIGITS = re.compile(r"\d+")
 class LvmLog(Log):
     """An opened LVM file.
 
-    It has two derived channels.  `write` numbers, from 1, the write of each row: a new write begins at a new header, at
-    a blank line, or where x does not increase.  `elapsed` exists if several file segments have a date.  It is the time
-    since the start of the first one: the start of the row's file segment plus x.
+    It has a derived channel `elapsed` if several file segments have a date: the time since the start of the first one,
+    which is the start of the row's file segment plus x.
     """
 
     options: Options = field(default_factory=Options)
@@ -44,7 +43,7 @@ class Reading:
     def __init__(self, log: LvmLog, names: Sequence[str]) -> None:
         self.log, self.names, self.encoding = log, tuple(names), log.options.encoding
         [clock] = log.by_clock(names) or [""]
-        self.derived = [channel.name for channel in log.channels if channel.derived and channel.kind != "time"]
+        self.elapsed = next((c.name for c in log.channels if c.derived and c.kind != "time"), "")
         self.own = next((c for c in log.clocks if c.time == clock), None)
         others = {name for c in log.clocks for name in (*c.channels, c.x)}
         written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
@@ -52,7 +51,7 @@ class Reading:
         self.together = (*self.own.channels, self.own.x) if self.own else first  # some have a sample in a row
         self.kinds: Counter[str] = Counter()  # of remarks, without their numbers
         self.walk, self.lines = Walk(self.encoding, self.say), Lines(log.path, self.encoding)
-        self.write = self.rows = self.rows_in_segment = self.back = 0
+        self.rows = self.rows_in_segment = self.back = 0
         self.went_back = ""
         self.last_x = np.nan
         self.file_segment: Layout | None = None
@@ -118,12 +117,10 @@ class Reading:
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
-        elapsed = self._since_start(run, x, cells.rows, before, self.first.first_channel)
-        derived = (self._writes(run, x, cells.rows), elapsed)
+        self._look_back(run, x)
         self._look_at(run, cells.rows)
-        for name, values in zip(self.derived, derived, strict=False):
-            if name in self.names:
-                block[name] = values
+        if self.elapsed in self.names:
+            block[self.elapsed] = self._since_start(run, x, cells.rows, before, self.first.first_channel)
         if self.own and self.own.time in self.names:
             columns = self._columns_of(run, [self.own.x] if self.own.x else [])
             own_x = next((cells.columns[i] for i in columns), None)
@@ -171,24 +168,19 @@ class Reading:
         if layout.notes:
             self.say(f"line {layout.line}: the header notes: {layout.notes}")
 
-    def _writes(self, run: Run, x: Array | None, rows: int) -> Array:
-        """Number the write of each row: a new write begins where x does not increase."""
-        begins = np.zeros(rows, dtype=bool)
-        if x is not None and rows:
-            before = np.concatenate(([self.last_x], x[:-1]))
-            begins = x <= before
-            begins[run.begins] = False
-            back = np.flatnonzero(begins)
-            if len(back) and not self.back:
-                i = int(back[0])
-                word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
-                self.went_back = f"line {run.line(i)}: x {word} {x[i]:g} in row {self.rows + i + 1}"
-            self.back += len(back)
-            self.last_x = x[-1]
-        begins[run.begins] = True
-        writes = self.write + np.cumsum(begins)
-        self.write = int(writes[-1]) if rows else self.write
-        return writes.astype(np.float64)
+    def _look_back(self, run: Run, x: Array | None) -> None:
+        """Count the rows where x does not increase, but for those behind a header or a blank line."""
+        if x is None or not len(x):
+            return
+        before = np.concatenate(([self.last_x], x[:-1]))
+        is_back = x <= before
+        is_back[run.begins] = False
+        if is_back.any() and not self.back:
+            i = int(np.argmax(is_back))
+            word = "stands still at" if x[i] == before[i] else f"goes back from {before[i]:g} to"
+            self.went_back = f"line {run.line(i)}: x {word} {x[i]:g} in row {self.rows + i + 1}"
+        self.back += int(np.count_nonzero(is_back))
+        self.last_x = x[-1]
 
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
         """Compute the time [s] since the start of the first file segment, from the headers of a channel.
@@ -226,7 +218,7 @@ class Reading:
             say("the file holds headers but no rows: the recorder stopped before its first write")
         if self.back:
             again = f" (the first of {self.back} times)" if self.back > 1 else ""
-            say(f"{self.went_back}{again}; the rows are kept, and the channel {self.derived[0]!r} numbers the writes")
+            say(f"{self.went_back}{again}; the rows are kept")
         if walk.narrow:
             say(f"line {walk.first_narrow}: the first of {walk.narrow} rows with too few cells; missing ones are nulls")
         for cells, line in sorted(walk.wide.items()):

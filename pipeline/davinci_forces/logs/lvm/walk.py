@@ -37,7 +37,7 @@ class Run:
     block: bytes = b""
     commented: bool = False  # the last cell of every row may hold a comment
     lines: list[int] | None = None  # line of each row, where they are not consecutive
-    begins: list[int] = field(default_factory=list)  # rows at which a write begins, by the lines before them
+    begins: list[int] = field(default_factory=list)  # rows behind a header or a blank line
     comments: list[tuple[int, bytes]] = field(default_factory=list)  # with their lines
     file_segments: list[tuple[int, Layout]] = field(default_factory=list)  # the row that each begins at
 
@@ -76,8 +76,7 @@ class Walk:
     wide: dict[int, int] = field(default_factory=dict)  # number of cells, if too many -> line of the first such row
     state: str = "before"
     _header: list[bytes] = field(default_factory=list)
-    _begins: bool = True  # the next row begins a write
-    _width: int = 0  # of the row before
+    _begins: bool = True  # the next row is behind a header or a blank line
     _rowless: bool = False  # no row since the last header
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
@@ -92,7 +91,7 @@ class Walk:
         """
         run = self._whole(block)
         if run and (taken := take(run, block.lines)) is not None:
-            self._begins, self._width, self._rowless = False, run.layout.width, False
+            self._begins = self._rowless = False
             self.line = block.first + block.lines - 1
             yield run, taken
         elif len(block.text) > LINEWISE_BYTES and block.lines > 1:
@@ -171,7 +170,7 @@ class Walk:
         if self._rowless and self.layout:
             self.say(f"line {self.layout.line}: the file segment whose header ends here holds no rows")
         self.layout = layout(self._header, line, self.file, self.line, self.encoding)
-        self._header, self._begins, self._width, self._rowless = [], True, self.layout.width, True
+        self._header, self._begins, self._rowless = [], True, True
         sampled = self.layout.sampling
         if self.layout.names not in self.met or len({*sampled.values()}) > 1:
             self.groups = refine_groups(self.groups, sampled, self.file.x_columns == "Multi")
@@ -224,12 +223,12 @@ class Walk:
             run.file_segments.append((len(run.lines), layout))
         if cells != layout.width:
             line, cells = self._fitted(line, cells, separator, layout, run)
-        if self._begins or (cells != self._width and layout.file.x_columns == "No"):
+        if self._begins:
             run.begins.append(len(run.lines))
         run.width = max(run.width, cells)
         run.lines.append(self.line)
         self._rows.append(line)
-        self._begins, self._width, self._rowless = False, cells, False
+        self._begins = self._rowless = False
 
     def _fitted(self, line: bytes, cells: int, separator: bytes, layout: Layout, run: Run) -> tuple[bytes, int]:
         """Remove trailing empty cells and the comment from a row whose width is not the layout's."""
