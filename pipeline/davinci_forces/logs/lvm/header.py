@@ -47,7 +47,6 @@ class Layout:
     step_written: str = ""
     sampling: dict[str, Sampling] = field(default_factory=dict)  # of the channels with samples
     remarks: tuple[str, ...] = ()  # what is wrong in the header, and what was done
-    notes: str = ""
 
     @property
     def width(self) -> int:
@@ -108,12 +107,10 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
         start, started = _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
     sampled = [i for i in measured if _cell(tags, "Samples", i) != "0"]  # without samples the other cells mean nothing
     written = _first(tags, "Delta_X")
-    notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
     return Layout(
         file=file, names=tuple(names), units=tuple(units), line=line, samples=max(samples, default=None),
         start=start, started=started, x0=_number(_first(tags, "X0")) or 0.0, step=_number(written),
         step_written=written, sampling={names[i]: _sampling(tags, i, start) for i in sampled}, remarks=tuple(remarks),
-        notes=notes,
     )  # fmt: skip
 
 

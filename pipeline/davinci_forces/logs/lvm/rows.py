@@ -165,8 +165,6 @@ class Reading:
         assert self.first is not None
         if absent := sorted(set(self.first.names) - set(layout.names)):
             self.say(f"line {layout.line}: from here on without {', '.join(absent)}, read as nulls")
-        if layout.notes:
-            self.say(f"line {layout.line}: the header notes: {layout.notes}")
 
     def _look_back(self, run: Run, x: Array | None) -> None:
         """Count the rows where x does not increase, but for those behind a header or a blank line."""
