@@ -26,8 +26,8 @@ DIGITS = re.compile(r"\d+")
 class LvmLog(Log):
     """An opened LVM file.
 
-    It has a derived channel `elapsed` if several file segments have a date: the time since the start of the first one,
-    which is the start of the row's file segment plus x.
+    A channel `elapsed` is derived if several file segments have a date.  It is the time since the start of the first
+    one: the start of the row's file segment plus x.
     """
 
     options: Options = field(default_factory=Options)
