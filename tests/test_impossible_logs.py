@@ -183,7 +183,7 @@ REMARKS = {
     "two": r"/hand_roll: no segment without a gap holds 4 of the 2 samples; record more",
     "clock": r"\.lvm: time does not increase at row 250 .*: 4\.98 s, then 4\.98 s; name another time channel",
     "marks": r": line 23: the header's decimal mark is ',', but cells use '\.' and ','; each cell is read with its own",
-    "channel": r"\.lvm: there is no channel 'tau' among its 4; it has 'X_Value', 'q', 'dq'",
+    "channel": r"\.lvm: there is no channel 'tau' among its 3; it has 'X_Value', 'q', 'dq'",
     "stated": r": line 22: the header states 7 samples, but 500 rows follow; these are read",
     "milliseconds": r'1e\+03 times .* is the time in ms\? write unit = "ms"',
     "segments": r"\.lvm: channel 'dq' has no sample at row 250 .*, and 250 of its 500 rows .*; record the log again",

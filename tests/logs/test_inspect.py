@@ -47,7 +47,7 @@ def test_it_shows_channels_units_clock_comments_and_first_rows(log: Path) -> Non
 
 def test_json_holds_the_same_and_no_nan(log: Path) -> None:
     found = json.loads(shown(log, "--json"), parse_constant=lambda word: pytest.fail(word))
-    assert [channel["unit"] for channel in found["channels"]] == ["s", "A", "rad", ""]
+    assert [channel["unit"] for channel in found["channels"]] == ["s", "A", "rad"]
     assert found["head"]["<script>"] == [1, 2, None, 4]
     assert_allclose(found["clock"]["rate"], 100)
     assert (found["channels"][1]["nans"], found["channels"][2]["nulls"]) == (1, 1)
