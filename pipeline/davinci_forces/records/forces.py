@@ -126,20 +126,25 @@ class Track(LogJointRecord):
     unscored: Counts
 
 
-class FreeSpace(LogJointRecord):
-    """The external effort of smoother or filter on one joint of one log, where nothing touched the robot."""
+class FreeEffort(LogJointRecord):
+    """The levels of one filter's external effort on one joint of one log, where nothing touched the robot."""
 
     KEY = ("log", "joint", "filter")
 
     filter: str
     role: str
-    tested: int
     free_rms: float
     free_rms_std: float
     free_level: float
     free_level_std: float
     detection_level: float
     detection_level_std: float
+
+
+class FreeSpace(FreeEffort):
+    """The external effort of smoother or filter in free space, and the coverage of its stated band."""
+
+    tested: int
     coverage: float
     coverage_std: float
     band_width: float
@@ -243,21 +248,12 @@ class StreamLevel(JointRecord):
     contacts_found: int
 
 
-class Comparison(LogJointRecord):
+class Comparison(FreeEffort):
     """One filter on one joint of a log: its effort in free space, and its response to a push added in software."""
 
-    KEY = ("log", "joint", "filter")
     PUBLISHED = ("{filter}.{log}.{joint}: push_share push_delay",)
 
-    filter: str
-    role: str
     default: int  # whether it is the default filter, whose free space is in FreeSpace, as is that of the smoother
-    free_rms: float
-    free_rms_std: float
-    free_level: float
-    free_level_std: float
-    detection_level: float
-    detection_level_std: float
     push_peak: float
     push_share: float
     push_delay: float

@@ -109,35 +109,40 @@ class Motion(LogJointRecord):
     filled: Counts
 
 
-class Average(LogJointRecord):
-    """One period of a joint, averaged over the periods of a recording, with the spread between them."""
-
-    PUBLISHED = ("period.{log}: =period± periods", "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±")
+class AveragedPeriod(LogJointRecord):
+    """One period of a joint, averaged over the periods of a recording, and the noise of the recording."""
 
     rate: float
     period: float
-    period_std: float
-    stated_period: float
     periods: int
     t_start: float
     sigma_q: float
-    sigma_q_std: float
     sigma_dq: float
-    sigma_dq_std: float
     sigma_tau: float
-    sigma_tau_std: float
     sigma_tau_white: float
-    relative_noise: float
-    relative_noise_std: float
     t: Column
     q: Column
     dq: Column
     tau: Column
-    q_var: Column
-    dq_var: Column
     tau_var: Column
     tau_alternating: Column
     count: Counts
+
+
+class Average(AveragedPeriod):
+    """One period as measured, with the spread between the periods."""
+
+    PUBLISHED = ("period.{log}: =period± periods", "noise.{log}.{joint}: sigma_q± sigma_dq± sigma_tau± relative_noise±")
+
+    period_std: float
+    stated_period: float
+    sigma_q_std: float
+    sigma_dq_std: float
+    sigma_tau_std: float
+    relative_noise: float
+    relative_noise_std: float
+    q_var: Column
+    dq_var: Column
 
 
 class PeriodResidual(LogJointRecord):
@@ -149,26 +154,11 @@ class PeriodResidual(LogJointRecord):
     tau_noise: Column
 
 
-class Trajectory(LogJointRecord):
-    """One averaged period with its velocity and acceleration, without noise, and the level of that noise."""
+class Trajectory(AveragedPeriod):
+    """One period of harmonics without noise, with the velocity and acceleration that follow from them."""
 
-    rate: float
-    period: float
-    periods: int
-    t_start: float
     harmonics: int
-    sigma_q: float
-    sigma_dq: float
-    sigma_tau: float
-    sigma_tau_white: float
-    t: Column
-    q: Column
-    dq: Column
     ddq: Column
-    tau: Column
-    tau_var: Column
-    tau_alternating: Column
-    count: Counts
 
 
 class Spectrum(LogJointRecord):

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, Published
 
 
-class Whiteness(LogJointRecord):
-    """The whiteness of a signal: its autocorrelation and its tests."""
+class TestedSignal(LogJointRecord):
+    """Correlations of one signal over the lag, and the bands that they keep if it is white."""
 
     KEY = ("log", "joint", "signal")
 
@@ -14,6 +14,12 @@ class Whiteness(LogJointRecord):
     tested: int
     band: float
     band_99: float
+    lag: Counts
+
+
+class Whiteness(TestedSignal):
+    """The whiteness of a signal: its autocorrelation and its tests."""
+
     acf1: float
     acf1_std: float
     outside: float
@@ -31,7 +37,6 @@ class Whiteness(LogJointRecord):
     kurtosis_std: float
     white: int
     all_white: int
-    lag: Counts
     acf: Column
     cycles: Column
     cumulated: Column
@@ -47,20 +52,13 @@ class Whiteness(LogJointRecord):
         return self.publish("ekf.{log}.{joint}", f"{tests} white=all_white")
 
 
-class Innovation(LogJointRecord):
+class Innovation(TestedSignal):
     """One innovation of the default filter: its size over the predicted size, and its correlation with the motion."""
 
-    KEY = ("log", "joint", "signal")
-
-    signal: str
-    tested: int
-    band: float
-    band_99: float
     nis_own: float
     nis_own_std: float
     nis_low: float
     nis_high: float
-    lag: Counts
     with_dq: Column
     with_ddq: Column
     with_sign: Column

@@ -1,9 +1,7 @@
 """The tasks of a step, one per call of its function, with the places of their records and all that they depend on."""
 
-import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field, replace
-from hashlib import sha256
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from davinci_forces import __version__
@@ -11,7 +9,7 @@ from davinci_forces.files import read_bytes, write_bytes
 from davinci_forces.records import KINDS, Record
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.fingerprint import Fingerprint, code, hash_of, schemas
-from davinci_forces.runner.ledger import Entry, Folders, Ledger
+from davinci_forces.runner.ledger import Entry, Ledger
 from davinci_forces.runner.signature import Declaration, Kinds, stage_of
 from davinci_forces.stages import module
 from davinci_forces.study import Study
@@ -221,27 +219,16 @@ def log_of(asks: Declaration, task: str) -> str:
 
 
 def reuse(ledger: Ledger, task: Task) -> str:
-    """Copy a task's outputs from a neighbouring study with the same fingerprint, and return its name, or ""."""
+    """Copy a task's outputs from a neighbouring study in which it is up to date, and return its name, or ""."""
     processed = ledger.folders.processed
     if task.fingerprint.inputs:
         return ""
-    now = json.loads(json.dumps(asdict(task.fingerprint)))
     for neighbour in sorted(processed.parent.iterdir()):
-        source = replace(ledger.folders, processed=neighbour)
-        entry = None if neighbour == processed else Ledger(source).read(task.step, task.name)
-        same = entry and not entry.failed and entry.fingerprint == now
-        if entry and same and (contents := _contents(source, entry)):
-            for name, content in contents.items():
-                write_bytes(ledger.folders.file(name), content)
+        source = Ledger(replace(ledger.folders, processed=neighbour))
+        entry = None if neighbour == processed else source.read(task.step, task.name)
+        if entry and not source.reasons(entry, task.fingerprint):
+            for name in entry.outputs:
+                write_bytes(ledger.folders.file(name), read_bytes(source.folders.file(name)))
             ledger.write(entry)
             return neighbour.name
     return ""
-
-
-def _contents(folders: Folders, entry: Entry) -> dict[str, bytes]:
-    """The outputs of an entry, or none if any is missing or altered."""
-    if not all(folders.file(name).is_file() for name in entry.outputs):
-        return {}
-    contents = {name: read_bytes(folders.file(name)) for name in entry.outputs}
-    unchanged = all(sha256(contents[name]).hexdigest() == sha for name, sha in entry.outputs.items())
-    return contents if unchanged else {}
