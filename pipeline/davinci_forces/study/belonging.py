@@ -21,7 +21,8 @@ from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import JOINT_NUMBER, Holding, Meaning, by_file_name, is_angle, with_motion
+from davinci_forces.study.guessing import JOINT_NUMBER, by_file_name, is_angle, with_motion
+from davinci_forces.study.holding import Holding, Meaning
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
 from davinci_forces.toml import TomlFile, TomlTable
@@ -85,23 +86,15 @@ def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms
     ]
     unnamed = [lone and not holding.has_named_joints for holding, lone in zip(assigned, untold, strict=True)]
     by_name = [i for i, lone in enumerate(untold) if lone and not unnamed[i]]
-    if len({_robot_and_joints(assigned[i]) for i in by_name}) == 1:
-        name = names[by_name[0]]  # its words tell the joint of the others, too
-        return [
-            by_file_name(of, name, robots, first).to_check(OTHERS_JOINT) if is_unnamed else of
-            for of, is_unnamed in zip(assigned, unnamed, strict=True)
-        ]
+    named = [assigned[i] for i in by_name]
+    joints = {(of.robot.name if of.robot else "", frozenset(of.joints_with())) for of in named}
     several = any(holding.joints > 1 for holding in assigned)
-    return [
-        of.to_check(UNCLEAR_JOINT) if several and is_unnamed else of
-        for of, is_unnamed in zip(assigned, unnamed, strict=True)
-    ]
-
-
-def _robot_and_joints(holding: Holding) -> tuple[str, frozenset[int]]:
-    """The robot of which a log is known to be, or "", and its joints."""
-    robot = holding.robot.name if holding.robot else ""
-    return robot, frozenset(meaning.joint for meaning in holding.meanings.values())
+    for i in (i for i, lone in enumerate(unnamed) if lone):
+        if len(joints) == 1:  # the words of that name tell the joint of the others, too
+            assigned[i] = by_file_name(assigned[i], names[by_name[0]], robots, first).to_check(OTHERS_JOINT)
+        elif several:
+            assigned[i] = assigned[i].to_check(UNCLEAR_JOINT)
+    return assigned
 
 
 def arm_of(
@@ -151,16 +144,13 @@ def _is_davinci(holding: Holding, is_named: bool) -> bool:
 
     Three joints are as many as it has. More may be of any arm, unless names say which.
     """
-    if holding.joints not in (POSITION_COUNTS if is_named else POSITION_COUNTS[:1]) or len(holding.ranges) < 3:
+    counts = POSITION_COUNTS if is_named else POSITION_COUNTS[:1]
+    if holding.joints not in counts or not {0, 1, 2} <= holding.ranges.keys():
         return False
     if any(m.joint == 2 and is_angle(holding.units.get(name, "")) for name, m in holding.meanings.items()):
         return False
-    (low, high), turning = holding.ranges[2], holding.ranges[:2]
-    return (
-        low >= -MAX_SLIDE
-        and high <= MAX_SLIDE
-        and all(least >= -MAX_TURN and most <= MAX_TURN for least, most in turning)
-    )
+    reach = [max(map(abs, holding.ranges[joint])) for joint in range(3)]
+    return max(reach[:2]) <= MAX_TURN and reach[2] <= MAX_SLIDE
 
 
 def _joint_names(holding: Holding) -> list[str]:

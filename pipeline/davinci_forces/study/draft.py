@@ -16,7 +16,8 @@ from davinci_forces.study import belonging
 from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import force_sensor, is_tissue, tissue_channels
 from davinci_forces.study.entries import is_inside
-from davinci_forces.study.guessing import Holding, guess
+from davinci_forces.study.guessing import guess
+from davinci_forces.study.holding import Holding
 from davinci_forces.study.log_table import DraftLog, LogTable, Row, paths_in
 from davinci_forces.study.names import is_time
 from davinci_forces.study.roles import Evidence, roles_of
@@ -181,14 +182,11 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
             yield from ("", f"[robot_overrides.{joint.name}]")
             yield 'effort = "A"  # a current; if the drive is known, write torque_constant and gear_ratio in its place'
         elif not joint.effort:
-            yield from (
-                "",
-                f"[robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive",
-            )
-            yield from (
-                f"# gear_ratio = {joint.gear_ratio!r}  # [{'rad/m' if joint.kind is Kind.PRISMATIC else 'rad/rad'}]",
-                f"# torque_constant = {joint.torque_constant!r}  # [N m/A]; efforts scale with both; a mass tests them",
-            )
+            yield ""
+            yield f"[robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive"
+            yield f"# gear_ratio = {joint.gear_ratio!r}  # [{'rad/m' if joint.kind is Kind.PRISMATIC else 'rad/rad'}]"
+            scaled = "efforts scale with both; a mass tests them"
+            yield f"# torque_constant = {joint.torque_constant!r}  # [N m/A]; {scaled}"
 
 
 def _joints_by_current(robot: Robot, drawn: Sequence[DraftLog]) -> list[Joint]:

@@ -2,17 +2,18 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.unexplained import Course, smoothed_course
+from davinci_forces.maths.contact.unexplained import smoothed_course
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import canonical, measures, size
 from davinci_forces.robots.robot import Joint, Kind, Robot
+from davinci_forces.study.holding import BY_FILE, BY_NUMBER, POSITIONS, VELOCITIES, Holding, Meaning
 from davinci_forces.study.names import (
     FORCE_WORDS,
     IN_DEGREES,
@@ -33,78 +34,7 @@ from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, name
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
-BY_NUMBER = "by the number in its name"
-BY_FILE = "by the joint in its file's name"
 JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
-POSITIONS, VELOCITIES, EFFORTS = ("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i")
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """What one channel holds: a symbol of a joint, counted from 0, the reason, and the unit usual with its recorder."""
-
-    symbol: str
-    joint: int
-    reason: str
-    unit: str = ""
-
-
-@dataclass(frozen=True)
-class Holding:
-    """What the channels of a log hold, by name, and how its joints move."""
-
-    meanings: dict[str, Meaning] = field(default_factory=dict)
-    joints: int = 0
-    labels: tuple[str, ...] = ()  # of the joints, where names have words for them
-    robot: Robot | None = None  # whose joints the names name
-    timing: TimeGuess = field(default_factory=TimeGuess)
-    moving: tuple[int, ...] = ()  # joints, counted from 0
-    repeats: bool = False
-    steady: bool = False
-    ranges: tuple[tuple[float, float], ...] = ()  # of the positions
-    units: dict[str, str] = field(default_factory=dict)  # that the log states, by name
-    courses: dict[int, Course] = field(default_factory=dict, compare=False)  # of the moving joints
-
-    def symbols(self) -> set[str]:
-        """The symbols of the joints."""
-        return {meaning.symbol for meaning in self.meanings.values()}
-
-    def joints_of_ranges(self) -> list[int]:
-        """The joints with positions, in the order of `ranges`."""
-        return sorted({meaning.joint for meaning in self.meanings.values() if meaning.symbol in POSITIONS})
-
-    def with_joints(self, joints: Sequence[int]) -> "Holding":
-        """The same with other numbers of the joints: `joints[k]` instead of k."""
-        order = sorted(range(len(self.ranges)), key=lambda i: joints[self.joints_of_ranges()[i]])
-        return replace(
-            self, joints=max(joints) + 1,
-            meanings={name: replace(m, joint=joints[m.joint]) for name, m in self.meanings.items()},
-            moving=tuple(sorted(joints[k] for k in self.moving)), ranges=tuple(self.ranges[i] for i in order),
-            courses={joints[k]: course for k, course in self.courses.items()},
-        )  # fmt: skip
-
-    def to_check(self, what: str = "") -> "Holding":
-        """The same with each channel to be checked, and what of it."""
-        reasons = {name: m.reason.removeprefix("CHECK: ") for name, m in self.meanings.items()}
-        mark = f"CHECK: {what}; " if what else "CHECK: "
-        return replace(self, meanings={n: replace(m, reason=mark + reasons[n]) for n, m in self.meanings.items()})
-
-    @property
-    def is_to_check(self) -> bool:
-        """Whether what each channel holds is a guess by its values."""
-        return all(meaning.reason.startswith("CHECK") for meaning in self.meanings.values())
-
-    @property
-    def has_named_joints(self) -> bool:
-        """Whether names tell the joints."""
-        by_name = {meaning.reason for meaning in self.meanings.values()} & {BY_FILE, BY_NUMBER}
-        return self.robot is not None or any(self.labels) or bool(by_name)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether a joint has a position and an effort."""
-        with_effort = {meaning.joint for meaning in self.meanings.values() if meaning.symbol in EFFORTS}
-        return not with_effort.isdisjoint(self.joints_of_ranges())
 
 
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
@@ -190,15 +120,12 @@ def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: in
     for robot in robots:
         joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, name)]
         if len(joints) == 1:
-            named, joint = holding.with_joints(joints), robot.joints[joints[0]]
-            meanings = {
-                n: replace(m, symbol=_side(m.symbol, (), holding.units.get(n, ""), joint), reason=BY_FILE)
-                for n, m in named.meanings.items()
-            }
+            named, joint = holding.with_joints(joints).with_reasons(lambda _: BY_FILE), robot.joints[joints[0]]
+            sides = {n: _side(m.symbol, (), holding.units.get(n, ""), joint) for n, m in named.meanings.items()}
+            meanings = {n: replace(m, symbol=sides[n]) for n, m in named.meanings.items()}
             return replace(named, joints=len(robot.joints), meanings=meanings, robot=robot, labels=())
     if number and int(number[1]) >= first:
-        holding = replace(holding.with_joints([int(number[1]) - first]), labels=())
-        return replace(holding, meanings={n: replace(m, reason=BY_FILE) for n, m in holding.meanings.items()})
+        return replace(holding.with_joints([int(number[1]) - first]).with_reasons(lambda _: BY_FILE), labels=())
     return holding
 
 
@@ -346,5 +273,5 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
         holding, meanings=meanings, timing=timing, moving=moving, courses=courses, units=units,
         repeats=again is not None and again.stop - again.start >= MIN_REPEATING_SHARE * len(q[joints[0]]),
         steady=velocity is not None and columns.is_steady(velocity),
-        ranges=tuple((float(q[joint].min()), float(q[joint].max())) for joint in joints),
+        ranges={joint: (float(values.min()), float(values.max())) for joint, values in q.items()},
     )  # fmt: skip

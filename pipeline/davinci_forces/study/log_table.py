@@ -15,7 +15,7 @@ from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import belonging
 from davinci_forces.study.channels import OF_THE_LOG, kind_of_unit, unit_of
 from davinci_forces.study.entries import ROLES
-from davinci_forces.study.guessing import Holding, Meaning
+from davinci_forces.study.holding import POSITIONS, Holding, Meaning
 from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.roles import Role
 from davinci_forces.study.timing import samples_of
@@ -126,7 +126,7 @@ class LogTable:
         joints, holding = self.robot.joints, self.draft.guess
         if any(meaning.reason.startswith("CHECK") for meaning in holding.meanings.values()):
             yield "CHECK: what its channels hold"
-        lacking = {m.joint for m in holding.meanings.values()} - {*holding.joints_of_ranges()}
+        lacking = holding.joints_with() - holding.joints_with(POSITIONS)
         yield from (f"no position of {joints[k].name}" for k in sorted(lacking) if k < len(joints))
         yield from (f"joint of {name}" for name, symbol in self._without_joint().items() if symbol == "q")
         if self.role.role == "weight":
@@ -139,13 +139,9 @@ class LogTable:
             return
         yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
         if self.role.role == "weight":
-            mass = (
-                f"weight = {{ mass = {self.role.mass:g} }}  #"
-                if self.role.mass
-                else "weight = {}  # mass = <kg, if known>;"
-            )
+            mass = f"{{ mass = {self.role.mass:g} }}  #" if self.role.mass else "{}  # mass = <kg, if known>;"
             elsewhere = 'moves_with = "<joint>", position = [x, y, z], in m from the remote centre'
-            yield f"{mass} CHECK: at the tip; elsewhere also {elsewhere}"
+            yield f"weight = {mass} CHECK: at the tip; elsewhere also {elsewhere}"
             if self.tare:
                 yield f"tare = {in_toml(self.tare)}  # the run without the mass, to be subtracted"
 
@@ -169,7 +165,7 @@ class LogTable:
     def _without_joint(self) -> dict[str, str]:
         """Symbols by name of channels named as those of a joint, but of none of the robot's, while it lacks some."""
         holding = self.draft.guess
-        if not holding.robot or len({m.joint for m in holding.meanings.values()}) == len(self.robot.joints):
+        if not holding.robot or len(holding.joints_with()) == len(self.robot.joints):
             return {}
         names = [c.name for c in self.draft.log.channels if c.kind == "number" and c.name not in holding.meanings]
         return {name: symbol for name in names if (symbol := symbol_of(words_of(name)))}
@@ -177,12 +173,11 @@ class LogTable:
     def _unknown_units(self) -> dict[str, str]:
         """Channels without a unit of joints that move farther than a drive, and which units they may have."""
         holding, unknown = self.draft.guess, {}
-        reach = {k: max(-low, high) for k, (low, high) in zip(holding.joints_of_ranges(), holding.ranges, strict=True)}
         units = {channel.name: stated_unit(channel) for channel in self.draft.log.channels}
         for name, m in holding.meanings.items():
             if m.symbol not in ("q", "dq") or m.unit or units.get(name) or m.joint >= len(self.robot.joints):
                 continue
-            rate, far = "/s" * (m.symbol == "dq"), reach.get(m.joint, 0.0)
+            rate, far = "/s" * (m.symbol == "dq"), max(map(abs, holding.ranges.get(m.joint, (0.0,))))
             unit, small, drive, in_small = UNKNOWN_UNITS[self.robot.joints[m.joint].kind]
             if far > in_small:
                 counted = f'scale = <{unit}{rate} per count>, unit = "{unit}{rate}"'
@@ -229,8 +224,7 @@ class LogTable:
         if meaning.joint >= len(self.robot.joints):
             count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
             return f'# "<joint>.{meaning.symbol}" = {in_toml(channel.name)}  # {count}'
-        joint, holding = self.robot.joints[meaning.joint], self.draft.guess
-        stated = stated_unit(channel)
+        joint, holding, stated = self.robot.joints[meaning.joint], self.draft.guess, stated_unit(channel)
         unit = _fitting(meaning, joint, hides_unit=stated != channel.unit)
         value = f"{{ channel = {in_toml(channel.name)}, unit = {in_toml(unit)} }}" if unit else in_toml(channel.name)
         note = f"in {stated}" if stated else f"in {unit}" if unit else "no unit: SI"
@@ -238,7 +232,7 @@ class LogTable:
             value, note = f'{{ channel = {in_toml(channel.name)}, unit = "" }}', f"MISSING: {unknown}"
         line = f"{in_toml(f'{joint.name}.{meaning.symbol}')} = {value}"
         if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
-            if meaning.joint not in holding.joints_of_ranges():
+            if meaning.joint not in holding.joints_with(POSITIONS):
                 return f"# {line}  # CHECK: no position of the joint"
             if self.robot.chain is None:
                 return f"# {line}  # the joint does not move"
@@ -285,11 +279,8 @@ def _touches_throughout(draft: DraftLog) -> str:
 
 def _in_millimetres(log: Log, touching: dict[str, str]) -> set[str]:
     """Channels of lengths without a unit whose values span more than any push in metres."""
-    names = [
-        channel.name
-        for channel in log.channels
-        if OF_THE_LOG.get(touching.get(channel.name, "")) == "length" and not unit_of(channel, touching[channel.name])
-    ]
+    lengths = [name for name, quantity in touching.items() if OF_THE_LOG[quantity] == "length"]
+    names = [name for name in lengths if not unit_of(log.find(name), touching[name])]
     if not names or len(log.by_clock(names)) > 1:
         return set()
     samples = samples_of(log, names)

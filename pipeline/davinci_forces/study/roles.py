@@ -7,7 +7,7 @@ from itertools import chain
 from typing import NamedTuple
 
 from davinci_forces.maths.contact.unexplained import MIN_UNEXPLAINED, Course, has_outliers, unexplained_share
-from davinci_forces.study.guessing import Holding
+from davinci_forces.study.holding import Holding
 
 # Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.
 WORDS = {
