@@ -124,11 +124,10 @@ def _limits(table: TomlTable) -> Limits:
     for name, pair in zip(("q", "dq", "ddq"), pairs, strict=True):
         limits.likely(name, (end for end in pair if end not in ANYWHERE))
     q, dq, ddq = ((float(low), float(high)) for low, high in pairs)
-    changed = Limits(q, dq, ddq)
-    if "effort" in limits:
-        effort = limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
-        changed = replace(changed, effort=effort)
-    return changed
+    expected = "the largest effort of the drive"
+    stated = "effort" in limits
+    effort = limits.number("effort", above=0.0, expected=expected, kind="force") if stated else math.inf
+    return Limits(q, dq, ddq, effort)
 
 
 def read_chain(table: TomlTable, joints: Sequence[Joint]) -> tuple[Chain | None, Bodies | None, tuple[str, ...]]:

@@ -87,15 +87,13 @@ def coupled_arm(
 ) -> CoupledArm:
     """Model coupled joints (indices `rows`), each with viscous, Coulomb and added friction.
 
-    Raises ValueError if the robot has no chain.
+    Raises BadRobot if the robot has no chain.
     """
-    if robot.chain is None:
-        raise ValueError(f"{robot.name} has no chain")
     names, joints = tuple(joint.name for joint in robot.joints), [robot.joints[row] for row in rows]
     friction = tuple((viscous, coulomb, *terms) for terms in added)
     keys = ("inertia", "effort", "position", "gain")
     units = tuple({key: joint.unit(f"{{{key}}}") for key in keys} for joint in joints)
-    return CoupledArm(group, names, tuple(rows), robot.chain, friction, units, name)
+    return CoupledArm(group, names, tuple(rows), robot.known_chain, friction, units, name)
 
 
 def model_of(

@@ -1,9 +1,10 @@
 """A table of a TOML file, read key by key; problems are noted with place and line, not raised one by one."""
 
+import json
 import math
 import sys
 import tomllib
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
@@ -68,6 +69,13 @@ def excerpt(value: Any) -> str:
     except ValueError:  # more digits than Python writes
         return "a number of thousands of digits"
     return text if len(text) <= 80 else f"{text[:76]} ..."
+
+
+def in_toml(value: object) -> str:
+    """A text, number, truth value, list or table of them as TOML; but for tables, JSON has the same form."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{in_toml(str(key))} = {in_toml(of)}' for key, of in value.items())} }}"
+    return json.dumps(value, ensure_ascii=False)
 
 
 class TomlTable:

@@ -152,10 +152,8 @@ def _frames(
     root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Mover], coordinates: list[str],
     weights: dict[str, Array | None],
 ) -> list[ChainFrame]:  # fmt: skip
-    indices, frames = (
-        {name: i for i, name in enumerate([root, *(joint.child for joint in ordered)])},
-        list[ChainFrame](),
-    )
+    indices = {name: i for i, name in enumerate([root, *(joint.child for joint in ordered)])}
+    frames = list[ChainFrame]()
     for joint in ordered:
         by, weight = moved[joint.name], weights[joint.child]
         parameters = np.zeros(len(PARAMETERS)) if weight is None else weight
