@@ -5,17 +5,25 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from davinci_forces.estimators.problem import NO_PRIOR, ROWS, Prior, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.physical import ROUNDING, Box
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.smoothing import measured_motion
 from davinci_forces.maths.signals.standstill import is_standing_still
 from davinci_forces.records import JointModel, Motion, Trajectory
 from davinci_forces.robots.robot import Joint
+
+
+def parameter_columns(model: Model) -> dict[str, NDArray[Any]]:
+    """What a Fit states of each parameter (p,) of a model."""
+    rows = [(p.name, p.typst, p.unit, p.scale, float(p.positive)) for p in model.parameters]
+    columns = zip(("parameter", "phi", "unit", "scale", "positive"), zip(*rows, strict=True), strict=True)
+    return {name: np.array(column, object if isinstance(column[0], str) else float) for name, column in columns}
 
 
 def pose(model: IndependentJoint, t: Trajectory, known: Prior = NO_PRIOR) -> Regression:

@@ -20,7 +20,7 @@ from davinci_forces.identification.chosen import (
 from davinci_forces.identification.identifiability import excite_command
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.observations import Observed, is_evaluated, observe
-from davinci_forces.identification.regression import recorded_motion
+from davinci_forces.identification.regression import parameter_columns, recorded_motion
 from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.maths.selection import standard_error
@@ -237,7 +237,6 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
     """The Fit of a part of a candidate to all logs."""
     model, log = part.model, part.library.logs[0]
     processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
-    defined = model.parameters
     return Fit.like(
         estimate,
         group=model.group,
@@ -249,11 +248,7 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
         logs=tuple(log.records[0].log for log in part.library.logs),
         periods=0,
         correlated_lags=0,
-        parameter=np.array([parameter.name for parameter in defined], object),
-        phi=np.array([parameter.typst for parameter in defined], object),
-        unit=np.array([parameter.unit for parameter in defined], object),
-        scale=np.array([parameter.scale for parameter in defined]),
-        positive=np.array([parameter.positive for parameter in defined], float),
+        **parameter_columns(model),
     )
 
 

@@ -20,7 +20,7 @@ from davinci_forces.identification.identifiability import (
 )
 from davinci_forces.identification.model_error import model_std
 from davinci_forces.identification.observations import CellEquations, Observed, block_equations, observe, pose_samples
-from davinci_forces.identification.regression import join_regressions, known_of, pose
+from davinci_forces.identification.regression import join_regressions, known_of, parameter_columns, pose
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.identification.unseen import left_out
 from davinci_forces.maths.arrays import Array
@@ -177,8 +177,8 @@ def identifiability(
     if plain is None:
         return
     joint, excitation = robot.joint(model.group), analyse_columns(regression.triangle)
-    names = [parameter.name for parameter in model.parameters]
-    pairs, insignificant = describe_correlated(names, excitation), describe_insignificant(regression, plain)
+    names = parameter_columns(model)["parameter"]
+    pairs, insignificant = describe_correlated(names.tolist(), excitation), describe_insignificant(regression, plain)
     yield Identifiability(
         group=model.group,
         model=model.name,
@@ -186,8 +186,8 @@ def identifiability(
         together=tuple(pairs),
         not_seen=tuple(insignificant),
         advice=advice(robot, joint, (*pairs, *insignificant)),
-        parameter=np.repeat(np.array(names, object), len(names)),
-        beside=np.tile(np.array(names, object), len(names)),
+        parameter=np.repeat(names, len(names)),
+        beside=np.tile(names, len(names)),
         correlation=excitation.correlation.ravel(),
     )
     wrong = [name for name, estimate in estimates.items() if inertia_of(model.terms, estimate.theta) <= 0.0]
@@ -221,14 +221,14 @@ def cost_of_consistency(
         yield diagnostic("fit", group, "note", f"{message}; consistent has none, and leaves an effort of {cost}")
 
 
-def fit_residual(regression: Regression, estimate: Estimate) -> Array:
-    """Residual effort of a fit on its own data."""
-    return np.asarray((regression.tau - regression.Phi @ estimate.theta)[regression.periods > 0])
+def fit_residual(regression: Regression, theta: Array) -> Array:
+    """Residual effort of parameters (p,) on the data of a fit."""
+    return np.asarray((regression.tau - regression.Phi @ theta)[regression.periods > 0])
 
 
 def r_squared(regression: Regression, estimate: Estimate) -> float:
     """Share of the effort's variance that a fit explains, R2."""
-    tau, residual = regression.tau[regression.periods > 0], fit_residual(regression, estimate)
+    tau, residual = regression.tau[regression.periods > 0], fit_residual(regression, estimate.theta)
     spread = tau - tau.mean()
     return float(1 - residual @ residual / (spread @ spread))
 
@@ -258,7 +258,7 @@ def fit_record(
     lowpass: float,
 ) -> Fit:
     """The Fit of an estimate, with its mean square error and R2 on its own data."""
-    squares, r2 = fit_residual(regression, estimate) ** 2, r_squared(regression, estimate)
+    squares, r2 = fit_residual(regression, estimate.theta) ** 2, r_squared(regression, estimate)
     mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
     return Fit.like(
         estimate,
@@ -277,14 +277,10 @@ def fit_record(
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
         correlated_lags=round(estimate.standard_errors.lags),
-        parameter=np.array([parameter.name for parameter in model.parameters], object),
-        phi=np.array([parameter.typst for parameter in model.parameters], object),
-        unit=np.array([parameter.unit for parameter in model.parameters], object),
-        scale=np.array([parameter.scale for parameter in model.parameters]),
-        positive=np.array([parameter.positive for parameter in model.parameters], float),
         theta_std_noise=estimate.standard_errors.noise,
         theta_std_model=estimate.standard_errors.model,
         theta_std_classical=estimate.standard_errors.classical,
+        **parameter_columns(model),
     )
 
 
@@ -293,20 +289,14 @@ def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
     theta = regression.known.guess
     if theta is None:
         return
-    residual = regression.tau - regression.Phi @ theta
-    yield Guess(
-        group=model.group,
-        mse=float(np.mean(residual**2)),
-        mse_std=error_of_pooled_mean(residual**2),
-        parameter=np.array([parameter.name for parameter in model.parameters], object),
-        unit=np.array([parameter.unit for parameter in model.parameters], object),
-        theta=theta,
-    )
+    squares = (regression.tau - regression.Phi @ theta) ** 2
+    mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
+    columns = parameter_columns(model)
+    yield Guess(model.group, mse, mse_std, columns["parameter"], columns["unit"], theta)
 
 
 def swarm_search(model: IndependentJoint, name: str, search: Search, regression: Regression) -> SwarmSearch:
     """The record of a swarm search, with its history.  Fig 6.14"""
-    residual = (regression.tau - regression.Phi @ search.theta)[regression.periods > 0]
     return SwarmSearch.like(
         search,
         group=model.group,
@@ -314,7 +304,7 @@ def swarm_search(model: IndependentJoint, name: str, search: Search, regression:
         estimator=name,
         iterations=len(search.history),
         mse=float(search.history[-1]),
-        mse_std=error_of_pooled_mean(residual**2),
+        mse_std=error_of_pooled_mean(fit_residual(regression, search.theta) ** 2),
         best_mse=search.history,
     )
 
@@ -335,14 +325,14 @@ def cross_fits(
         else:
             left_out.append(names)
             thetas.append(theta)
-    parameters, refitted = model.parameters, len(thetas)
+    columns = parameter_columns(model)
     yield CrossFit(
         group=model.group,
         model=model.name,
         estimator=name,
-        left_out=np.repeat(np.array(left_out, object), len(parameters)),
-        parameter=np.array([parameter.name for parameter in parameters] * refitted, object),
-        unit=np.array([parameter.unit for parameter in parameters] * refitted, object),
+        left_out=np.repeat(np.array(left_out, object), len(model.parameters)),
+        parameter=np.tile(columns["parameter"], len(thetas)),
+        unit=np.tile(columns["unit"], len(thetas)),
         theta=np.concatenate([[], *thetas]),
     )
 
