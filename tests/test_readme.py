@@ -313,6 +313,16 @@ def test_the_study_file_of_the_guide_is_one(tmp_path):
     assert study.logs[0].joints == ("hand_roll",)
 
 
+@pytest.mark.medium
+def test_the_scenario_of_the_guide_is_simulated_and_its_push_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("slide.toml").write_text(PAGES["simulate"].partition("```toml\n")[2].partition("```")[0])
+    for command in (["simulate", "slide.toml", "raw/slide"], ["measure", "raw/slide"]):
+        assert CliRunner().invoke(app, command).exit_code == 0
+    push = davinci_forces.read("raw/slide", "Contact").query("stated == 1").iloc[0]
+    assert abs(push.peak - 20.0) < 3.0 * push.peak_std < 4.0
+
+
 def test_what_python_is_offered_is_what_the_guide_shows():
     code = PAGES["python"].partition("```python\n")[2].partition("```")[0]
     assert set(davinci_forces.__all__) <= set(re.findall(r"davinci_forces\.(\w+)\(", code))
