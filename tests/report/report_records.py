@@ -1,5 +1,6 @@
 """Records with nothing in them but what a test is about."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,6 @@ def stiffness(contacts: int, **scores: Any) -> Stiffness:
 
 def record(kind: type[AnyRecord], length: int, **values: Any) -> AnyRecord:
     """A record of any kind: columns of a length, and nothing in them but the values given."""
-    scalars = {name: kind.__annotations__.get(name, "str") for name in kind.scalars()}
-    empty = {name: "" if declared in ("str", str) else 0.0 for name, declared in scalars.items()}
+    declared = {field.name: field.type for field in fields(kind)}  # type: ignore[arg-type]
+    empty = {name: "" if declared[name] in ("str", str) else 0.0 for name in kind.scalars()}
     return kind(**(empty | dict.fromkeys(kind.columns(), np.zeros(length)) | values))
