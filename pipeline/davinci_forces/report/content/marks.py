@@ -12,12 +12,13 @@ Style = Literal["", "solid", "dashed", "dotted", "dashdot"]
 
 
 class Mark:
-    """What all marks share: columns become float arrays of one length, checked once when made."""
+    """What all marks share: columns become float arrays of one length, but for one edge more, checked when made."""
 
     def __post_init__(self) -> None:
         columns = {f.name: _column(getattr(self, f.name)) for f in fields(self) if f.type is Array}  # type: ignore[arg-type]
         shapes = {name: column.shape for name, column in columns.items()}
-        if any(len(shape) != 1 for shape in shapes.values()) or len(set(shapes.values())) > 1:
+        lengths = {column.size - (name == "edges") for name, column in columns.items()}
+        if any(len(shape) != 1 for shape in shapes.values()) or len(lengths) > 1:
             raise ValueError(f"{type(self).__name__}: columns must be flat and of one length, not {shapes}")
         for name, column in columns.items():
             object.__setattr__(self, name, column)
@@ -77,19 +78,13 @@ class Stems(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Histogram:
+class Histogram(Mark):
     """Counts (or densities) between edges: (n + 1,) edges and (n,) counts."""
 
     edges: Array
     counts: Array
     label: str = ""
     colour: Colour = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "edges", _column(self.edges))
-        object.__setattr__(self, "counts", _column(self.counts))
-        if self.edges.shape != (len(self.counts) + 1,):
-            raise ValueError(f"Histogram: {len(self.counts)} counts need one edge more, not {self.edges.shape}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +104,7 @@ class Tiles(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Bars:
+class Bars(Mark):
     """One bar per name; several Bars in a panel share the names and stand side by side."""
 
     names: tuple[str, ...]
@@ -118,9 +113,9 @@ class Bars:
     colour: Colour = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "heights", _column(self.heights))
-        if self.heights.shape != (len(self.names),):
-            raise ValueError(f"Bars: {len(self.names)} names need as many heights, not {self.heights.shape}")
+        super().__post_init__()
+        if len(self.heights) != len(self.names):
+            raise ValueError(f"Bars: {len(self.names)} names need as many heights, not {len(self.heights)}")
 
 
 @dataclass(frozen=True)

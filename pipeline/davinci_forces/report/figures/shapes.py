@@ -1,7 +1,7 @@
 """Shapes and words of a picture as SVG, in points; whole paths in few characters."""
 
+import re
 from html import escape
-from itertools import pairwise
 
 import numpy as np
 
@@ -32,12 +32,8 @@ def _run(x: Array, y: Array, scale: int) -> str:
 
 def _joined(numbers: list[float]) -> str:
     """Numbers with a space only where a reader of paths needs it: not before a sign, nor between two points."""
-    texts = [f"{n:g}".replace("0.", ".", 1) if abs(n) < 1 else f"{n:g}" for n in numbers]
-    parts = texts[:1]
-    for before, text in pairwise(texts):
-        joins = text.startswith("-") or (text.startswith(".") and "." in before)
-        parts.append(text if joins else f" {text}")
-    return "".join(parts)
+    text = re.sub(r"\b0\.", ".", " ".join(f"{n:g}" for n in numbers))
+    return re.sub(r" (?=-)|(?<=\.\d) (?=\.)|(?<=\.\d\d) (?=\.)", "", text)
 
 
 def symbols(x: Array, y: Array) -> str:

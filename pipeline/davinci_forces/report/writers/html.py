@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -12,7 +11,7 @@ from davinci_forces.report.content import Document, Equation, Figure, Figure3D, 
 from davinci_forces.report.content.inline import Span, parse, printable
 from davinci_forces.report.content.layout import columns, flatten, marked_texts, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.writers.numbers import Json, numbers_json, thin_figure, thinning_note
+from davinci_forces.report.writers.numbers import Json, json_of, numbers_json, thin_figure, thinning_note
 from davinci_forces.report.writers.pictures import NAMES, address, looks, shrink
 from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
 
@@ -50,7 +49,7 @@ def render(document: Document) -> bytes:
             (TEMPLATES / name).read_text(encoding="utf-8")
             for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
         ],
-        "rated": _json(asdict(document.rated)) if document.rated else "",
+        "rated": json_of(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
     still = {name: thin_figure(figure, STILL_POINTS) for name, figure in figures.items() if name not in zooms}
     kept = {f"numbers {name}": numbers_json(figure) for name, figure in still.items()}
@@ -75,11 +74,6 @@ def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
     share = room // POINT_BYTES // max(len(zooms), 1)
     limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
     return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
-
-
-def _json(value: Any) -> str:
-    """Data for a script in the page, without any text that could close the script's element."""
-    return json.dumps(value, ensure_ascii=False).replace("<", "\\u003c").replace(SIGN, "")
 
 
 def _fill(page: Json, names: list[str]) -> str:

@@ -23,7 +23,7 @@ CODED_STEPS = 8  # between neighbouring samples of a column that increases
 
 
 def numbers_json(figure: Figure | Figure3D) -> str:
-    """The figure as JSON without any text that could close the HTML element around it."""
+    """The figure as JSON."""
     columns: dict[str, int] = {}  # encoded column -> its index; marks share equal columns
     if isinstance(figure, Figure):
         panels = figure.panels
@@ -35,6 +35,11 @@ def numbers_json(figure: Figure | Figure3D) -> str:
         "panels": [_panel(panel, columns) for panel in panels],
         "columns": [json.loads(column) for column in columns],
     }
+    return json_of(content)
+
+
+def json_of(content: Any) -> str:
+    """Data of the page as JSON without any text that could close the HTML element around it."""
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
