@@ -176,15 +176,15 @@ def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse
     """0.101 is within the standard error of the difference; equal scores are no overfitting."""
     results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     assert standard_error(results[1], results[0]) > 0.001
-    named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
-    assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits
+    named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
+    assert ("overfits" in reason(named, results, 0, 0)) == overfits
 
 
 @pytest.mark.parametrize(("difference", "overfits"), [(0.9e-4, False), (1.1e-4, True)])
 def test_errors_that_differ_by_less_than_the_last_printed_digit_are_equal(difference, overfits):
     results = [worth(0.1), worth(0.1 + difference)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
-    named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
-    assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits
+    named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
+    assert ("overfits" in reason(named, results, 0, 0)) == overfits
 
 
 def test_an_inertia_has_to_be_positive_at_fifty_poses_of_each_log_or_at_all_of_a_shorter_one():

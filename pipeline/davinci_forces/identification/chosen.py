@@ -82,7 +82,7 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
         },
         chosen=models[chosen],
         best=models[best],
-        why=reason(models, results, [c.size for c in models], chosen, best),
+        why=reason(models, results, chosen, best),
     )
 
 
@@ -107,7 +107,7 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
         scores={name: np.concatenate([of.scores[name] for of in both]) for name in fixed.scores},
         chosen=candidates[i]._replace(variant=CHOSEN),
         best=candidates[best],
-        why=reason(candidates, results, [c.size for c in candidates], i, best),
+        why=reason(candidates, results, i, best),
     )
 
 
@@ -129,9 +129,7 @@ def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:
     return (errors.score, standard_error(errors)) if errors else (float("nan"), float("nan"))
 
 
-def reason(
-    candidates: Sequence[Candidate], results: Sequence[CrossValidation], sizes: Sequence[int], i: int, best: int
-) -> str:
+def reason(candidates: Sequence[Candidate], results: Sequence[CrossValidation], i: int, best: int) -> str:
     """State why a candidate was chosen, and whether one that fits better overfits."""
     text = f"{candidates[i].name} has an out-of-sample error of {results[i].score:.4f} of the effort"
     if i == best:
@@ -141,7 +139,7 @@ def reason(
         clearly = "it is not clearly better" if difference <= std else "not all smaller models are clearly worse"
         text += (
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
-            f"{clearly}, and it has {sizes[best]} parameters instead of {sizes[i]}"
+            f"{clearly}, and it has {candidates[best].size} parameters instead of {candidates[i].size}"
         )
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))

@@ -3,8 +3,7 @@
 A step changes the processing, adds the term that most reduces the error on parts of the path left out, or changes the
 term's scale.  It has to reduce the error of at least two thirds of the blocks of path.  The search ends where there is
 no such term.  Of all steps, the first one is chosen that is not clearly worse than the best: by at most one standard
-error of the difference.
-The errors of all steps are those of the scores, whatever a step's low-pass.
+error of the difference.  The errors of all steps are those of the scores, whatever a step's low-pass.
 """
 
 from collections.abc import Iterator, Sequence
@@ -90,8 +89,7 @@ class JointSearch:
         key = processing, terms
         if key not in self._libraries:
             logs = [log.process([processing] * len(log.records)) for log in self.logs]
-            equations = candidates.library(self.model(terms), logs, len(logs))
-            self._libraries = {key: equations}  # only the last one is used again
+            self._libraries = {key: candidates.library(self.model(terms), logs, len(logs))}  # only the last is reused
         return self._libraries[key]
 
     def step(
@@ -116,8 +114,7 @@ class JointSearch:
                 except np.linalg.LinAlgError:
                     continue
                 steps.append(Step(name, processing, terms, strength, len(columns), errors))
-            steps = steps if self._schemes else []
-            self._steps[key] = min(steps, key=lambda step: step.score) if steps else None
+            self._steps[key] = min(steps, key=lambda step: step.score, default=None) if self._schemes else None
         step = self._steps[key]
         return step._replace(name=name) if step else None
 
@@ -250,10 +247,8 @@ def searched_candidates(
     arm: tuple[Observed, ...], count: int,
 ) -> list[Candidate]:  # fmt: skip
     """Return the models that were searched: the best of each joint by itself, and coupled joints that share links."""
-    by_joint: dict[str, list[SearchResult]] = {}
-    for search in searches:
-        by_joint.setdefault(search.joint, []).append(search)
-    best = [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint.values()]
+    by_joint = ([search for search in searches if search.joint == joint] for joint in separate)
+    best = [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint if of_joint]
     if len(best) < len(separate):
         return []
     parts = [searched_part(robot, s, separate[s.joint] if s.structure == "independent" else arm, count) for s in best]
