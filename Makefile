@@ -43,10 +43,12 @@ for folder in sorted((f for f in pathlib.Path("pipeline").rglob("*") if f.is_dir
 endef
 export FORGET
 
-.PHONY: all quick test check every-test format lint types oracles axe approve bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
+.PHONY: all install quick test check every-test format lint types oracles axe approve bench mutants locks demo pictures clean help $(STAGES) $(GROUPS)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
+
+install: $(READY) ## set up .venv, and no more
 
 $(STAGES) $(GROUPS): $(READY)
 	$(RUN) $@ $(or $(STUDY),raw/davinci-demo) --jobs $(JOBS)
