@@ -177,7 +177,10 @@ def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
         return None
     weight = table.table("weight")
     mass = weight.number("mass", above=0.0, expected="a number of kg") if "mass" in weight else None
+    if "tare" in weight.values:
+        weight.problem(f"write tare = {weight.text('tare')!r} on a line of its own, below weight", "tare")
     if not weight.values.keys() & {"moves_with", "position"}:
+        weight.asked |= dict.fromkeys(("moves_with", "position"))
         weight.close()
         return AttachedMass("", None, mass)
     links = robot.chain.links if robot and robot.chain else ()
