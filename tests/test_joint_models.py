@@ -215,3 +215,13 @@ def test_joints_recorded_one_at_a_time_are_named_with_the_remedy_where_they_coup
         "`davinci-forces excite davinci all`"
     ] * (not together)
     assert not list(choose.never_together(logs, arm.ARM))  # which has no chain
+
+
+def test_efforts_in_amperes_are_said_to_keep_joints_from_sharing_links():
+    from davinci_forces.robots import davinci
+
+    first, *others = davinci.ROBOT.joints
+    robot = replace(davinci.ROBOT, joints=(replace(first, effort="A"), *others))
+    [warning] = choose.no_shared_links(robot)
+    assert "the effort of hand_roll is in A, so no model is tried whose joints share links" in warning.text[0]
+    assert not list(choose.no_shared_links(davinci.ROBOT))

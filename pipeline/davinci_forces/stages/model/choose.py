@@ -57,6 +57,8 @@ def run(
     if robot.chain is not None and any(log.is_moving.sum() > 1 for log in logs):
         yield from not_of_arm(logs, robot)
     yield from never_together(logs, robot)
+    if arm:
+        yield from no_shared_links(robot)
     reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
     fixed = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), len(logs))
     if fixed is None:
@@ -137,6 +139,14 @@ def never_together(logs: Sequence[Observed], robot: Robot) -> Iterator[Diagnosti
         text = f"arm: no identification log moves {join_names(joints)} together, so the effort that each needs for the "
         remedy = f"where they move together, record an excitation of all: {excite_command(robot, 'all')}"
         yield diagnostic("choose", "together", "warning", f"{text}motion of the others is not identified; {remedy}")
+
+
+def no_shared_links(robot: Robot) -> Iterator[Diagnostic]:
+    """Warn that efforts in A keep the joints of an arm from sharing the parameters of links."""
+    if in_amperes := [joint.name for joint in robot.joints if joint.effort]:
+        text = f"arm: the effort of {join_names(in_amperes)} is in A, so no model is tried whose joints share links"
+        remedy = "it may err less; state torque_constant in [robot_overrides], and it is"
+        yield diagnostic("choose", "arm.currents", "warning", f"{text}; {remedy}")
 
 
 def choice(selection: Selection, logs: Sequence[Observed], fitted: Sequence[Fit]) -> Iterator[Choice | Diagnostic]:

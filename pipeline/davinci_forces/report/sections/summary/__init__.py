@@ -81,7 +81,7 @@ def rule_in_words(trusts: list[Trust]) -> str:
 
 def caption(contacts: list[Contact], panels: list[Panel]) -> str:
     """The caption of the figure, which names the log if all panels are of one, as `in_column` then does not."""
-    level = "Grey band: 95 % of the samples in free space."
+    level = "Grey: the level that 95 % of the samples in free space stay below, not an error band."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
@@ -176,7 +176,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", TOUCHED) for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
-        level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
+        level = [HBand(-size, size, "free space: level of 95 % of samples") for size in levels]
         shown = converged_rows(track.t)
         line = Line(track.t[shown], track.tau_ext_smooth[shown], "external effort", "vermillion")
         still = spans_where(track.t, track.standing > 0, "at rest: not judged", REST)
@@ -229,7 +229,8 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "share of the run's motion that is unlike any fitted path; above 10 %, it tests the model. Model error: RMS of "
         "measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of the "
         "measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
-        "free-space samples are lower. Coverage: share of free-space samples in the 95 % band. ± is one standard error."
+        "free-space samples are lower. Coverage: share of free-space samples in the stated 95 % error band. ± is one "
+        "standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))

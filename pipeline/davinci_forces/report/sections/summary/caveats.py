@@ -149,7 +149,7 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         space = trusted.narrowest
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
-            covers += " More logs of free motion, at these speeds and on other days, calibrate it."
+            covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it."
         yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 
 
