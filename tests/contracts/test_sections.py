@@ -326,6 +326,15 @@ def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(ful
     assert all(said in text for text in looks)
 
 
+@pytest.mark.parametrize(("share", "said"), [(0.1038, "10.4 % of the effort"), (0.16, "16 % of the effort")])
+def test_an_error_just_above_that_of_a_good_model_is_not_rounded_to_it(full: Context, share, said):
+    p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.model_error" in full.results)
+    about = replace(p, model_error=share, mean_error=0.0, effort_rms=1.0)
+    [(_, text)] = caveats.looks_at_model(full, Trust("hand_roll", about, None, None))
+    assert said in text
+    assert "that of a good model is at most 10 %" in text
+
+
 def test_an_error_that_is_mostly_constant_is_named_with_what_is_left_without_it(full: Context):
     p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.mean_error" in full.results)
     p = replace(p, model_error=0.5, mean_error=0.4, mean_error_std=0.01, effort_rms=1.0)

@@ -266,6 +266,7 @@ def test_the_reason_names_a_better_model_of_the_other_selection():
     both = better(fixed, selection_of(searched=(9, 0.105, True)))
     assert (both.chosen.name, both.best.name) == ("searched", "large")
     assert "the best, large, errs by 0.0050 less" in both.why
+    assert both.why.endswith("The best has 30 parameters, the chosen one 9")
 
 
 def test_fits_of_different_efforts_make_one_candidate_of_their_mean_error():

@@ -136,10 +136,11 @@ def reason(candidates: Sequence[Candidate], results: Sequence[CrossValidation], 
         text += ", less than any other"
     else:
         difference, std = results[i].score - results[best].score, standard_error(results[i], results[best])
-        clearly = "it is not clearly better" if difference <= std else "not all smaller models are clearly worse"
+        preferred = "a model that is preferred, as it is smaller or shares links, is not clearly worse"
+        clearly = "it is not clearly better" if difference <= std else preferred
         text += (
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
-            f"{clearly}, and it has {candidates[best].size} parameters instead of {candidates[i].size}"
+            f"{clearly}. The best has {candidates[best].size} parameters, the chosen one {candidates[i].size}"
         )
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))

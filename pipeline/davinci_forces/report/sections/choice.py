@@ -32,8 +32,10 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
         "or the delay of the effort after the motion, adds one term, or changes the width or distance of one. It has "
         "to reduce the error on four or more of the six parts of the path. The model after the earliest step whose "
         "error is within one standard error of the least is taken. Then joints share the links' parameters, or each "
-        "keeps its own (“joint by joint”) where sharing is clearly worse. Of the candidates with fixed terms, the "
-        "simplest that is not clearly worse than the best is taken, unless the searched model errs less."
+        "keeps its own (“joint by joint”) where all models that share are clearly worse: by more than one standard "
+        "error of the difference. Sharing is preferred, as it alone holds for any motion of the joints together. Of "
+        "the candidates with fixed terms, the simplest that is not clearly worse than the best is taken, unless the "
+        "searched model errs less."
     )
     why = choice.why.removeprefix(choice.chosen)  # the choice is named once
     it = "It" if why != choice.why else ""

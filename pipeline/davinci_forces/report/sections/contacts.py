@@ -39,10 +39,11 @@ def section(context: Context) -> Iterator[Block]:
         yield from by_time(context, contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
-            "No.: number of the window in [@contact-peaks]. Mean and impulse: of the stated window, or from onset to "
-            "release. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below "
-            "the alarm level; “found” for a contact outside the windows that the study states, and “small” if its peak "
-            "is below twice the alarm level, so that it may be an error of the model."
+            "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Mean and "
+            "impulse: of the stated window, or from onset to release. Verdict: whether the peak exceeds the detection "
+            "level; “peak only” if it does but stays below the alarm level; “found” for a contact outside the windows "
+            "that the study states, and “small” if its peak is below twice the alarm level, so that it may be an error "
+            "of the model."
         )
         header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Mean", "Impulse", "Verdict")
         earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them

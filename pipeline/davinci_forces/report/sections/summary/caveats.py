@@ -113,7 +113,9 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
                 f"; {varying} without its constant part, {mean}, as of another payload or an offset of the current"
             )
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
-        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant or opposed}; "
+        share = percent(trusted.share)
+        share = f"{100 * trusted.share:.1f} %" if share == percent(verdicts.GOOD) else share
+        text = f"the model error is {error}, {share} of the effort{constant or opposed}; "
         text += f"that of a good model is at most {percent(verdicts.GOOD)}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
