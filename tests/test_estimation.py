@@ -15,6 +15,7 @@ from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.wlse import pool_variance
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.scores import folds
+from davinci_forces.maths.models.model import Parameter
 from davinci_forces.records import (
     Average,
     CrossFit,
@@ -395,7 +396,7 @@ def test_a_guess_states_its_error_with_its_standard_error():
     Phi, guess = rng.normal(size=(400, 2)), np.array([1.0, -2.0])
     tau = Phi @ guess + rng.normal(size=400)
     regression = SimpleNamespace(Phi=Phi, tau=tau, known=SimpleNamespace(guess=guess))
-    parameters = [SimpleNamespace(name=name, unit="N m") for name in "ab"]
+    parameters = [Parameter(name, "", "N m", positive=False) for name in "ab"]
     [made] = fit.guesses(SimpleNamespace(group="roll", parameters=parameters), regression)
     assert made.mse == pytest.approx(1.0, abs=0.2)
     assert made.mse_std == pytest.approx(np.sqrt(2.0 / 400), rel=0.3)  # of squares of normal values
