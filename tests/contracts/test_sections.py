@@ -470,6 +470,20 @@ def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Cont
     assert "the positive direction of the instrument slide is not that of the robot's chain" in verdict.text
 
 
+def test_a_mass_that_is_not_stated_leads_to_other_masses_only_if_there_are_some(full: Context):
+    [stated, *_] = full.catalogue.records(Weight)
+    unknown = replace(stated, stated_mass=float("nan"))
+
+    def said(*weights: Weight) -> str:
+        catalogue = Catalogue(lambda kind: list(weights) if kind is Weight else full.catalogue.records(kind))
+        return weight_section.verdict(replace(full, catalogue=catalogue), unknown).text
+
+    assert said(unknown, stated).endswith(
+        "none tests the scale of the efforts: [@weight-table] has scales of other masses."
+    )
+    assert said(unknown).endswith("none tests the scale of the efforts.")
+
+
 def test_every_run_with_a_mass_has_a_table_of_its_joints_and_the_first_stands_on_paper(full: Context):
     [of, *_] = full.catalogue.records(Weight)
     weights = [replace(of, log=log) for log in (of.log, "second", "third")]

@@ -93,12 +93,14 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     mass, scale = (context.number(f"weight.{weight.log}.{name}", 3) for name in ("mass", "scale"))
     stated = f"{Number(weight.stated_mass, 'kg')} is stated."
     level, why = grade_of_mass(context, weight)
+    tests_scale = any(math.isfinite(other.stated_mass) for other in context.catalogue.records(Weight))
+    others = ": [@weight-table] has scales of other masses" if tests_scale else ""
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
         "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
         f"that of the robot's chain. In study.toml {TURN_AROUND}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
-        "unstated": ". The study states no mass, so none tests the scale of the efforts: [@weight-table] has others.",
+        "unstated": f". The study states no mass, so none tests the scale of the efforts{others}.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
         f"{literal(worst_joint(weight))}, and where the mass hung.",
