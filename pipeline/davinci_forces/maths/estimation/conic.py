@@ -193,7 +193,7 @@ def complete(theta: Array, std: Array, mechanism: Mechanism, price: Array, guess
     allowed = np.fmax(MAX_GAP_SOLVER * np.abs(theta).max(), MAX_MISS * std)
     miss = float((np.abs(F @ z - theta) / allowed).max())
     if not miss <= 1.0:
-        why = f"no links were found that have these parameters: they miss them by {miss:.1e} of what rounding allows"
+        why = f"no links were found that have these parameters: the largest miss is {miss:.1e} of what is allowed"
         raise NotIdentifiable(f"{why}; make joints that no log moves `fixed` in the robot's URDF, or move them")
     x = B @ np.where(mechanism.positive & ~links, np.maximum(z, 0.0), z)
     J = pseudo_inertias(x[links].reshape(L, TEN)) / np.outer(scale, scale)
