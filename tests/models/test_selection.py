@@ -165,7 +165,8 @@ def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
     doubtful = [worth(0.100, 0.9, 1), worth(0.101, 0.9, 2), worth(0.5)]
     assert standard_error(doubtful[1], doubtful[0]) > 0.001
     assert choose_candidate(doubtful, [20, 10, 5], [True] * 3) == (1, 0)
-    of_one_size = [*doubtful[:2], worth(0.1005), worth(0.5)]  # the third is surely worse than the first, and better
+    of_one_size = [*doubtful[:2], worth(0.1005, 0.9, 1), worth(0.5)]  # the third is surely worse than the first
+    assert standard_error(of_one_size[2], of_one_size[0]) < 0.0005
     assert choose_candidate(of_one_size, [20, 10, 10, 5], [True] * 4) == (2, 0)
     certain = [worth(0.100), worth(0.101), worth(0.5)]  # all groups alike: a difference is one
     assert choose_candidate(certain, [20, 10, 5], [True] * 3) == (0, 0)
