@@ -1,6 +1,7 @@
 """What `inspect` says of a log."""
 
 import json
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from typer.testing import CliRunner
 from davinci_forces.commands import inspect
 from davinci_forces.maths.signals.columns import Outline
 from tests.logs.lvm_writer import Style, Write, lvm
-from tests.logs.test_clocks import said, tdms
+from tests.logs.test_clocks import NOON, said, tdms
 
 
 def shown(path: Path, *options: str) -> str:
@@ -97,7 +98,16 @@ def test_a_log_without_a_clock_says_what_may_be_one(tmp_path: Path) -> None:
 def test_an_lvm_log_whose_x_restarts_says_how_to_go_on(tmp_path: Path) -> None:
     path = tmp_path / "log.lvm"
     path.write_bytes(lvm([Write({"a": [1.0, 2.0]}, x=[0.0, 0.01])] * 3, Style(several=False)))
-    assert "time 'X_Value' goes back 2 times and repeats 0 times, first in row 3" in shown(path)
+    text = shown(path)
+    assert "time 'X_Value' goes back 2 times and repeats 0 times, first in row 3" in text
+    assert "  0.01 s from the first to the last sample, between interruptions 100 Hz, jitter" in text
+
+
+def test_the_zero_of_labview_is_no_start(tmp_path: Path) -> None:
+    epoch = (datetime(1904, 1, 1) - NOON).total_seconds()
+    path = tmp_path / "log.tdms"
+    path.write_bytes(tdms({"a/q": ([1, 2], said(epoch, 0.01))}))
+    assert "2 rows, start unknown: the file has LabVIEW's zero, 1904-01-01" in shown(path)
 
 
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(np.nan), min_size=20), st.lists(st.floats(0, 1), min_size=1))

@@ -133,7 +133,7 @@ def _clock(log: "Log", source: str, survey: _Survey) -> dict[str, Any]:
         "source": f"channel {source!r}" if source else "the log's own interval",
         "rate": _plain(survey.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
         "duration": _plain(clock.last - clock.first), "backward": clock.backward, "repeated": clock.repeated,
-        "duplicates": clock.duplicates,
+        "duplicates": clock.duplicates, "interruptions": survey.unusual,
     }  # fmt: skip
 
 
@@ -174,13 +174,19 @@ def _plain(value: float) -> float | None:
 
 def lines(description: dict[str, Any]) -> Iterator[str]:
     """The description as lines of text."""
+    from davinci_forces.logs.log import UNSET_START
+
     started = f", started {description['started']} ({description['zone']} time)" if description["started"] else ""
+    if description["started"].startswith(UNSET_START):
+        started = ", start unknown: the file has LabVIEW's zero, 1904-01-01"
     yield f"{description['file']}: {description['format']}, {description['rows']} rows{started}"
     yield from (f"  {key}: {value}" for key, value in description["facts"].items())
     clock = description["clock"]
     yield f"clock: {clock['source']}"
     if "rate" in clock:
-        yield f"  {clock['duration'] or 0:.6g} s at {clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
+        apart = "from the first to the last sample, between interruptions" if clock["interruptions"] else "at"
+        rate = f"{clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
+        yield f"  {clock['duration'] or 0:.6g} s {apart} {rate}"
         yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"
     yield f"  {clock['duplicates']} rows repeat the previous row"
     for extra in description["clocks"]:

@@ -31,6 +31,7 @@ from davinci_forces.maths.units import unit_in as unit_in
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples
+UNSET_START = "1904-01-01T00:00:00"  # LabVIEW's zero, which it writes for an unknown start
 SAMPLED_KINDS = ("number", "time")  # kinds of channels that are read
 BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels

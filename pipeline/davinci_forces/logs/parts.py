@@ -12,11 +12,10 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import SAMPLED_KINDS, Block, Channel, Log, Options, row_count, unique
+from davinci_forces.logs.log import SAMPLED_KINDS, UNSET_START, Block, Channel, Log, Options, row_count, unique
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
 
-UNSET_START = datetime(1904, 1, 1)  # LabVIEW's zero, which it writes for an unknown start
 ABSOLUTE = 1e9  # [s] a larger time counts from a fixed year, not from the start of its part
 
 
@@ -144,7 +143,7 @@ def starts_of(parts: Sequence[Log]) -> list[datetime]:
         return []
     starts = [datetime.fromisoformat(text) for text in texts]
     clocked = all(part.time or part.clock or any(channel.time for channel in part.channels) for part in parts)
-    return starts if clocked and UNSET_START not in starts else []
+    return starts if clocked and not any(text.startswith(UNSET_START) for text in texts) else []
 
 
 def _require_order(parts: Sequence[Log], starts: Sequence[datetime]) -> None:

@@ -264,8 +264,7 @@ def choose_candidate(
     """Indices of the chosen candidate and of the best.
 
     The chosen one has the lowest rank, such as the number of parameters, that has a candidate not clearly worse than
-    the best.  Of that rank it is the one with the least error, even if that is surely more than the best's: an error
-    that is known better does not count against it.
+    the best.  Of that rank it is the one with the least error, even if that is surely more than the best's.
 
     Raises ValueError if no candidate is eligible.
     """

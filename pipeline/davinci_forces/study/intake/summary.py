@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.files import visible
+from davinci_forces.logs.log import UNSET_START
 from davinci_forces.maths.signals.clock import FILLED, GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
@@ -33,8 +34,9 @@ def summary(intake: Intake) -> LogSummary:
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
     rate, duration, jitter, longest_gap = times if intake.clocks.all_timed else (float("nan"),) * 4
     return LogSummary.like(
-        clock, log=entry.name, role=entry.role, format=log.format, files=entry.files, started=log.started,
-        zone=log.zone, rows=clock.samples, rate=rate, duration=duration, jitter=jitter, longest_gap=longest_gap,
+        clock, log=entry.name, role=entry.role, format=log.format, files=entry.files,
+        started="" if log.started.startswith(UNSET_START) else log.started, zone=log.zone,
+        rows=clock.samples, rate=rate, duration=duration, jitter=jitter, longest_gap=longest_gap,
         dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
