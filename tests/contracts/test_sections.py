@@ -350,6 +350,16 @@ def test_an_error_of_twice_the_effort_suggests_a_wrong_sign(full: Context):
         assert ("wrong `sign`" in text) == suggests
 
 
+def test_the_reason_of_a_problem_comes_before_a_narrow_band(full: Context):
+    p = next(p for p in full.catalogue.records(Prediction) if f"{p.prefix}.model_error" in full.results)
+    p = replace(p, model_error=0.3, mean_error=0.0, effort_rms=1.0)
+    space = replace(full.catalogue.records(FreeSpace)[0], detection_level=0.2, coverage=0.1)
+    for sought, said in ((None, "the model error is"), (0.1, "the detection level of")):
+        looks = sorted(caveats.looks_at(full, [Trust("hand_roll", p, space, sought)]), reverse=True)
+        assert said in looks[0][1]
+        assert any("the 95 % band is too narrow" in text for _, text in looks[1:])
+
+
 def test_page_one_says_what_was_measured_beside_what_is_stated(full: Context):
     lines = opening.measurements(full)
     [weight, *_] = full.catalogue.records(Weight)

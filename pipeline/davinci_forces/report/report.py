@@ -29,7 +29,17 @@ LEGEND = (
     "new path: share of the run's motion that is unlike any fitted path; ceiling: largest R2 that noise allows; "
     "coverage: of the 95 % band"
 )
-HEADER = ("joint", "verdict", "new path", "model error", "error/effort", "R2", "ceiling", "detection level", "coverage")
+HEADER = (
+    "joint",
+    "verdict",
+    "new path",
+    "model error",
+    "relative error",
+    "R2",
+    "ceiling",
+    "detection level",
+    "coverage",
+)
 
 
 def write_report(

@@ -26,7 +26,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "replaces it, not that the fit is bad."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
-    header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")
+    header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Relative error", "$R^2$", "Ceiling")
     caption = (
         "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit; share "
         "of the run's path (the variance of its position) that no fitted path explains; model error; the mean "

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Stiffness, Track
+from davinci_forces.records import Contact, FreeSpace, Stiffness, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
@@ -220,17 +220,17 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = (
-        "Joint", "Verdict", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought,
+        "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level", *sought,
         "Coverage",
     )  # fmt: skip
     caption = (
         "Trust in the estimates. Each row is of the joint's worst logs: New path to Ceiling of that with the largest "
         "model error, Detection level of that with the highest level, Coverage of that with the lowest. New path: "
-        "share of the run's motion that is unlike any fitted path; above 10 %, it tests the model. Model error: RMS of "
-        "measured minus modelled effort, both low-passed, without noise. Error/effort: model error over the RMS of the "
-        "measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of "
-        "free-space samples are lower. Coverage: share of free-space samples in the stated 95 % error band. ± is one "
-        "standard error."
+        "share of the run's motion that is unlike any fitted path; above 10 %, it tests the model. Model error: RMS "
+        "of measured minus modelled effort, both low-passed, without noise. Relative error: model error over the RMS "
+        "of the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: "
+        "99 % of free-space samples are lower. Coverage: share of free-space samples in the stated 95 % error band. ± "
+        "is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
@@ -245,5 +245,11 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
     wanted = (size,) if with_sought else ()
     band = trusted.narrowest
-    covers = f"{percent(band.coverage)}, {band_in_words(band.coverage, band.coverage_std)}" if band is not None else "–"
+    covers = coverage_in_words(band) if band is not None else "–"
     return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
+
+
+def coverage_in_words(space: FreeSpace) -> str:
+    """The coverage of a 95 % band, and whether it is too narrow or too wide."""
+    words = band_in_words(space.coverage, space.coverage_std)
+    return percent(space.coverage) + (f", {words}" if words.startswith("too") else "")

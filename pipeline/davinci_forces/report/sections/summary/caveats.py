@@ -19,6 +19,7 @@ COMES_FIRST = re.compile(r"check the units|its external effort is not estimated"
 LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
+MAX_NARROW = 2.4  # largest weight of a narrow band: less than that of an error for which a joint's verdict is a problem
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 
 
@@ -152,7 +153,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
             covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it."
-        yield 1.0 + 10 * (verdicts.COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
+        weight = min(1.0 + 10 * (verdicts.COVERED[0] - space.coverage), MAX_NARROW)
+        yield weight, f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
