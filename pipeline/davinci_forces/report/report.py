@@ -30,16 +30,8 @@ LEGEND = (
     "coverage: of the 95 % band"
 )
 HEADER = (
-    "joint",
-    "verdict",
-    "new path",
-    "model error",
-    "relative error",
-    "R2",
-    "ceiling",
-    "detection level",
-    "coverage",
-)
+    "joint", "verdict", "new path", "model error", "relative error", "R2", "ceiling", "detection level", "coverage",
+)  # fmt: skip
 
 
 def write_report(
