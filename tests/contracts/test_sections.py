@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from davinci_forces import guide
 from davinci_forces.records import (
@@ -30,6 +31,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.record import diagnostic
+from davinci_forces.report import verdicts
 from davinci_forces.report.changes import Change, StatedValue
 from davinci_forces.report.content import (
     Bullets,
@@ -321,9 +323,10 @@ def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):
 @pytest.mark.parametrize(("sought", "said"), [(0.1, "hides efforts of"), (0.4, "is more than a third of"), (5.0, "")])
 def test_a_detection_level_is_a_caveat_where_it_comes_near_the_effort_sought(full: Context, sought, said):
     space = replace(full.catalogue.records(FreeSpace)[0], detection_level=0.2, coverage=0.95)
-    looks = [text for _, text in caveats.looks_at_band(full, Trust("hand_roll", None, space, sought))]
+    looks = [*caveats.looks_at_band(full, Trust("hand_roll", None, space, sought))]
     assert len(looks) == bool(said)
-    assert all(said in text for text in looks)
+    assert all(said in text for _, text in looks)
+    assert_allclose([weight for weight, _ in looks], 0.2 / sought / verdicts.DETECTED)  # 1 where caution begins
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.1038, "10.4 % of the effort"), (0.16, "16 % of the effort")])
