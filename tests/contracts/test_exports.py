@@ -336,6 +336,17 @@ def test_the_urdf_and_its_table_say_where_they_come_from_and_what_is_missing(tog
     ElementTree.fromstring(files["arm.urdf"])
 
 
+def test_the_urdf_of_a_joint_that_moved_beyond_its_limits_says_so(together):
+    for widened, beyond in ((0.0, False), (0.01, True)):
+        low, high = together.joints[0].joint.limits.q
+        validity = together.joints[0].validity | {"position": [low, high + widened]}
+        moved = replace(together, joints=(together.joints[0]._replace(validity=validity), *together.joints[1:]))
+        files, remarks = renderer("urdf")(moved)
+        text = f"warning: hand_roll moved from {low:.4g} to {high + widened:.4g} rad in its logs, beyond its limits"
+        assert any(remark.startswith(text) for remark in remarks) == beyond
+        assert (text in files["arm.urdf"]) == beyond
+
+
 def test_of_fits_the_urdf_takes_the_one_with_which_it_errs_least_and_says_what_it_lacks(together, monkeypatch):
     [fit] = urdf.consistent_fits(together)
     is_viscous = np.array([name.startswith("viscous") for name in fit.parameter])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ModelTerm, Rendering, terms_of
+from davinci_forces.exports.identified import DRIVE, FREE_ROLES, Export, ExportedJoint, ModelTerm, Rendering, terms_of
 from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
@@ -62,14 +62,29 @@ def render(export: Export) -> Rendering:
     free = _free_logs(export, arm.model)
     lost = _lost(export, arm, free)
     lacks = ", ".join(f"{row[0]} {row[1]} {row[-1]}" for row in lost if float(row[-1].split()[0]) >= 1.0)
+    beyond = [text for joint in consistent.joints if (text := _beyond_limits(joint))]
     note = [
         f"fit {'.'.join(arm.fit.key)}: of {len(arms)} with possible bodies, its URDF errs least in logs left out",
-        f"of all bodies that have it, those {near}",
+        f"many bodies have it, as only combinations follow from the logs: these are {near}, "
+        "so a single mass or inertia need not be that of the real link",
+        *beyond,
         f"warning: a URDF cannot hold {lacks or 'terms with less than 1 %'} of the joint's effort; {TABLE} lists all",
     ]
     urdf = writing.text(arm.robot, consistent.head(arm.fit) + note, arm.friction)
     table = "\n".join([*consistent.head(), *note, *_tables(export, arm, free, lost)]) + "\n"
-    return Rendering({"arm.urdf": urdf, TABLE: table}, [*consistent.remarks(), note[0], note[-1]])
+    return Rendering({"arm.urdf": urdf, TABLE: table}, [*consistent.remarks(), note[0], *beyond, note[-1]])
+
+
+def _beyond_limits(exported: ExportedJoint) -> str:
+    """Warn where the logs go beyond the limits of the robot's description, at which a simulation stops the joint."""
+    unit = exported.joint.unit("{position}")
+    (low, high), (least, most) = exported.joint.limits.q, exported.validity["position"]
+    if low <= least and most <= high:
+        return ""
+    return (
+        f"warning: {exported.name} moved from {least:.4g} to {most:.4g} {unit} in its logs, beyond its limits of "
+        f"{low:.4g} to {high:.4g} {unit}, which the URDF keeps; correct the limits in the robot's description"
+    )
 
 
 def consistent_fits(export: Export) -> list[Fit]:
