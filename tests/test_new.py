@@ -223,6 +223,10 @@ NAMES = {
         ["{} actual", "{} current actual"], [("roll",), ("pitch",), ("slide",)],
         ["hand_roll", "hand_pitch", "instrument_slide"], "i",
     ),
+    "the joint and a unit alone": (
+        ["{} [{}]", "{} [{}/s]", "I {} [A]"], [("Roll", "deg"), ("Pitch", "deg"), ("Insertion", "mm")],
+        ["hand_roll", "hand_pitch", "instrument_slide"], "i",
+    ),
     "force of a joint": (["q_{}", "f_{}"], [("roll",), ("insertion",)], ["hand_roll", "instrument_slide"], "tau"),
     "LabVIEW's own names": (["Untitled {}"], [(k,) for k in range(9)], ["joint_1", "joint_2", "joint_3"], "tau"),
 }  # fmt: skip

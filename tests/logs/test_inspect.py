@@ -100,7 +100,7 @@ def test_an_lvm_log_whose_x_restarts_says_how_to_go_on(tmp_path: Path) -> None:
     path.write_bytes(lvm([Write({"a": [1.0, 2.0]}, x=[0.0, 0.01])] * 3, Style(several=False)))
     text = shown(path)
     assert "time 'X_Value' goes back 2 times and repeats 0 times, first in row 3" in text
-    assert "  0.01 s from the first to the last sample, between interruptions 100 Hz, jitter" in text
+    assert "  0.01 s from the first to the last sample; between interruptions at 100 Hz, jitter" in text
 
 
 def test_the_zero_of_labview_is_no_start(tmp_path: Path) -> None:

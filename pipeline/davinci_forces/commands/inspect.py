@@ -184,7 +184,7 @@ def lines(description: dict[str, Any]) -> Iterator[str]:
     clock = description["clock"]
     yield f"clock: {clock['source']}"
     if "rate" in clock:
-        apart = "from the first to the last sample, between interruptions" if clock["interruptions"] else "at"
+        apart = "from the first to the last sample; between interruptions at" if clock["interruptions"] else "at"
         rate = f"{clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
         yield f"  {clock['duration'] or 0:.6g} s {apart} {rate}"
         yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"

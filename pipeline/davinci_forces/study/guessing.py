@@ -34,6 +34,10 @@ from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, name
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
+SYMBOL_OF_UNIT = {  # of what a unit measures
+    "angle": "q", "length": "q", "angle rate": "dq", "length rate": "dq", "current": "i", "torque": "tau",
+    "force": "tau",
+}  # fmt: skip
 JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
 
 
@@ -88,15 +92,16 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     of_the_kit = all(any(label & {*words} for words in named.values()) for label in (INSERTION_WORDS, {"yaw"}))
     of_the_kit |= any({"outer", "yaw"} <= {*words} for words in named.values())
     meanings: dict[str, Meaning] = {}
-    without_quantity: dict[int, str] = {}
+    bare: dict[tuple[int, str], list[str]] = {}  # channels whose names say a joint, and perhaps a unit, alone
     for channel in channels:
         words = named.get(channel.name, [])
         if of_the_kit:
             joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
         else:
             joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, channel.alias or channel.name)]
-        if len(joints) == 1 and {*words} <= {*words_of(robot.joints[joints[0]].name), *PROCESSED_WORDS}:
-            without_quantity.setdefault(joints[0], channel.name)
+        if len(joints) == 1 and _says_only(robot.joints[joints[0]], channel):
+            bare.setdefault((joints[0], measures(canonical(stated_unit(channel))) or ""), []).append(channel.name)
+            continue
         # Beside a joint, a force is its effort; the force at the tip is none.
         symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
         if len(joints) != 1 or not symbol:
@@ -104,10 +109,14 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
         symbol = _side(symbol, words, channel.unit, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
             meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name")
-    with_position = {m.joint for m in meanings.values() if m.symbol in POSITIONS}
-    for joint, name in without_quantity.items():  # `roll actual`, beside `roll current actual`
-        if joint not in with_position:
-            meanings[name] = Meaning("q", joint, "CHECK: position, as its name says no quantity")
+    for (joint, measured), names in bare.items():  # `roll (deg)`; `roll actual`, beside `roll current actual`
+        symbol = SYMBOL_OF_UNIT.get(measured, "q")
+        known = {AT_MOTOR.get(m.symbol, m.symbol) for m in meanings.values() if m.joint == joint}
+        if AT_MOTOR.get(symbol, symbol) not in known:
+            what = {"q": "position", "dq": "velocity", "i": "current"}.get(symbol, "effort")
+            doubt = len(names) > 1 or measured not in SYMBOL_OF_UNIT
+            reason = f"CHECK: {what}, as its name says no quantity" if doubt else f"{what} of the joint, by its unit"
+            meanings[names[0]] = Meaning(_side(symbol, (), measured, robot.joints[joint]), joint, reason)
     return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
 
 
@@ -151,6 +160,12 @@ def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
     last = parts[-1] if not parts[-1].isdecimal() else ""
     inserts = any(PSM_JOINTS[word] == joint.name for word in INSERTION_WORDS & {*words})
     return joint.name in name.lower() or set(parts) <= set(words) or last in words or inserts
+
+
+def _says_only(joint: Joint, channel: Channel) -> bool:
+    """Whether the name of a channel says nothing but the joint, and perhaps a unit."""
+    words = words_of(without_unit(channel.alias or channel.name))
+    return {*words} <= {*words_of(joint.name), *PROCESSED_WORDS, *INSERTION_WORDS}
 
 
 def by_numbers(channels: Sequence[Channel]) -> Holding:
