@@ -23,7 +23,7 @@ from davinci_forces.report.content.marks import Histogram, Line, Points, Tiles
 from davinci_forces.report.figures.palette import COLOURS
 from davinci_forces.report.figures.panels import wrap_label
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.figures.ticks import power_of_ten
+from davinci_forces.report.figures.ticks import axis_over, power_of_ten
 from davinci_forces.report.writers import html, pdf
 from davinci_forces.report.writers.pictures import shrink
 
@@ -129,6 +129,15 @@ def test_no_number_on_an_axis_touches_the_next(low: float, high: float, columns:
         numbers = sorted((one for one in below if one.text != "position [m]"), key=lambda one: one.left)
         assert len(numbers) >= 2
         assert all(one.right < next_one.left for one, next_one in pairwise(numbers))
+
+
+def test_an_axis_that_counts_has_whole_numbers_and_one_with_a_unit_does_not() -> None:
+    for values, label, texts in (
+        ([1.0, 2.0], "window", ("1", "2")), ([0.0, 2.0], "window", ("0", "1", "2")),
+        ([1.0, 2.0], "time [s]", ("1.0", "1.2", "1.4", "1.6", "1.8", "2.0")),
+        ([0.0, 0.5], "share", ("0.0", "0.1", "0.2", "0.3", "0.4", "0.5")),
+    ):  # fmt: skip
+        assert axis_over([np.array(values)], (0.0, 0.0), False, label).with_numbers(5).texts == texts
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ class Axis:
     label: str
     values: tuple[float, ...] = ()
     texts: tuple[str, ...] = ()
+    whole: bool = False  # it counts, so it is numbered at whole numbers
 
     def share(self, x: Array | Sequence[float]) -> Array:
         """The place of each value along the axis: 0 at its lower end, 1 at its upper end."""
@@ -42,6 +43,7 @@ class Axis:
             return self._with_decades()
         exponent = power_of_ten(max(abs(self.low), abs(self.high)))
         scale = 10.0**exponent
+        most = min(most, max(int(self.high - self.low), 1)) if self.whole else most
         for intervals in range(most, 0, -1):
             values, step = round_values(self.low / scale, self.high / scale, intervals)
             texts = in_digits(values, step)
@@ -96,7 +98,8 @@ def axis_over(columns: Iterable[Array], margins: tuple[float, float], log: bool,
     below, above = margins
     if log:
         return Axis(low * (low / high) ** below, high * (high / low) ** above, log, label)
-    return Axis(low - below * (high - low), high + above * (high - low), log, label)
+    whole = "[" not in label and bool((values % 1.0 == 0.0).all())
+    return Axis(low - below * (high - low), high + above * (high - low), log, label, whole=whole)
 
 
 def round_values(low: float, high: float, intervals: int) -> tuple[Array, float]:

@@ -144,7 +144,7 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
         HBand(-level, level, "detection level" if named else ""),
         Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
     )
-    few = (0.0, 4.0) if len(peak) < 3 else None  # so that an axis of one or two windows is numbered by whole ones
+    few = (0.0, len(peak) + 1.0) if len(peak) < 3 else None
     return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks, x_range=few)
 
 

@@ -240,8 +240,8 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     """The numbers of one joint."""
     space, sought, share = trusted.space, trusted.sought, percent(trusted.share)
     scored, free = (about.prefix if about is not None else "" for about in (trusted.prediction, space))
-    error, r2 = context.numbers(scored, ("model_error", "r2"), 2)
-    ceiling, level = context.number(f"{scored}.r2_ceiling", 4, std=None), context.number(f"{free}.detection_level", 2)
+    error, level = context.number(f"{scored}.model_error", 2), context.number(f"{free}.detection_level", 2)
+    r2, ceiling = (context.number(f"{scored}.{name}", 4, std=None) for name in ("r2", "r2_ceiling"))
     size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
     wanted = (size,) if with_sought else ()
     band = trusted.narrowest
