@@ -60,6 +60,13 @@ def test_the_tissue_is_the_stiffest_of_those_that_were_measured(records):
     assert_allclose(response.felt_delay, 0.005, rtol=0.02)
 
 
+def test_a_device_that_scales_motion_and_force_renders_a_stiffness_scaled_by_both():
+    scaled = replace(SCENARIO, device=SCENARIO.device._replace(motion=0.5, force=3.0))
+    response = made([stiffness(k=500.0)], scenario=scaled)[0]
+    assert_allclose(response.rendered_stiffness, 0.5 * 3.0 * 500.0 * response.transparency)
+    assert_allclose(response.transparency, 1.0, atol=1e-3)
+
+
 def test_each_hand_has_its_run_and_its_limits(records):
     limit, run = records[1:]
     assert isinstance(run, HapticRun)
