@@ -134,8 +134,9 @@ def arm_of(
     text = robot_text(_joint_names(largest), current, _prismatic(counted), _limits(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
-    joints, why = "joint" if n == 1 else f"{n} joints", "; ".join(why_not) or "--robot names one"
-    reason = f"written for the {joints} of the logs, as no shipped robot fits; {why}"
+    joints, shipped = "joint" if n == 1 else f"{n} joints", ", ".join(robots.ROBOTS)
+    why = "; ".join(why_not) or "--robot takes one for its first joints"
+    reason = f"written for the {joints} of the logs, as no shipped robot ({shipped}) fits; {why}"
     return Arm(name, new_robot, reason, text)
 
 
