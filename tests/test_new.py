@@ -227,6 +227,17 @@ NAMES = {
         ["{} [{}]", "{} [{}/s]", "I {} [A]"], [("Roll", "deg"), ("Pitch", "deg"), ("Insertion", "mm")],
         ["hand_roll", "hand_pitch", "instrument_slide"], "i",
     ),
+    "units after a word": (
+        ["{} in {}", "{} speed in {}/s", "{} current in A"],
+        [("Roll", "deg"), ("Slide", "mm")], ["hand_roll", "instrument_slide"], "i",
+    ),
+    "derivatives with a dot": (
+        ["theta{}", "theta{}_dot", "i{}"], [("1",), ("2",), ("3",)], ["joint_1", "joint_2", "joint_3"], "i",
+    ),
+    "what is set and what is": (
+        ["{} act pos", "{} act cur"], [("Roll",), ("Pitch",), ("Slide",)],
+        ["hand_roll", "hand_pitch", "instrument_slide"], "i",
+    ),
     "force of a joint": (["q_{}", "f_{}"], [("roll",), ("insertion",)], ["hand_roll", "instrument_slide"], "tau"),
     "LabVIEW's own names": (["Untitled {}"], [(k,) for k in range(9)], ["joint_1", "joint_2", "joint_3"], "tau"),
 }  # fmt: skip
@@ -241,6 +252,8 @@ def test_names_that_laboratories_give_are_read_without_an_edit(tmp_path, kind):
     size = 0.2 * np.array([{"deg": 57.0, "°": 57.0, "mm": 1000.0}.get(label[-1], 1.0) for label in labels[:n]])
     blocks = [size * q, size * dq, effort(q, dq)] if len(names) == 3 * n else [size * q, effort(q, dq)]
     columns = dict(zip(names, np.column_stack(blocks).T.tolist(), strict=True))
+    if kind == "what is set and what is":
+        columns = {f"{joint} set pos": columns[names[0]] for (joint,) in labels} | columns
     if kind == "units that differ by joint":  # of which one is not told by its name
         columns["Position joint 1 setpoint [deg]"] = columns[names[0]]
     (tmp_path / "run.lvm").write_bytes(lvm([Write(columns, x=t.tolist())], Style(encoding="utf-8-sig")))
@@ -249,9 +262,21 @@ def test_names_that_laboratories_give_are_read_without_an_edit(tmp_path, kind):
     places = [f"{joint}.{quantity}" for quantity in symbols for joint in joints]
     assert found == {"time": "X_Value", **dict(zip(places, names, strict=True))}
     slides = [joint.kind is Kind.PRISMATIC for joint in reading.read(tmp_path).robot.joints]
-    assert slides[-1] == (kind not in ("drives", "LabVIEW's own names"))
+    assert slides[-1] == (kind not in ("drives", "LabVIEW's own names", "derivatives with a dot"))
     assert not any(slides[:-1])
     assert ("CHECK: what its channels hold" in said) == (kind in ("LabVIEW's own names", "only what is actual"))
+
+
+def test_a_name_tells_the_side_of_the_motor_whose_torque_is_to_be_checked(tmp_path):
+    t, q, dq = motion(1)
+    for effort_name, doubt in (("roll_Imotor", 0), ("Motor torque roll", 1)):
+        columns = {"roll_theta_m": q[:, 0].tolist(), effort_name: effort(q, dq)[:, 0].tolist()}
+        path = tmp_path / f"{doubt}" / "run.lvm"
+        path.parent.mkdir()
+        path.write_bytes(lvm([Write(columns, x=t.tolist())], Style(encoding="utf-8-sig")))
+        new(path)
+        assert held(path.parent)["hand_roll.theta_m"] == "roll_theta_m"
+        assert (path.parent / "study.toml").read_text().count("of the motor it needs scale = <gear ratio>") == doubt
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.unexplained import smoothed_course
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
-from davinci_forces.maths.units import canonical, measures, size
+from davinci_forces.maths.units import canonical, measures, size, unit_in
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study.holding import BY_FILE, BY_NUMBER, POSITIONS, VELOCITIES, Holding, Meaning
 from davinci_forces.study.names import (
@@ -20,6 +20,7 @@ from davinci_forces.study.names import (
     INSERTION_WORDS,
     PROCESSED_WORDS,
     PSM_JOINTS,
+    ROUGH_WORDS,
     SIGNAL_WORDS,
     Numbered,
     is_time,
@@ -93,7 +94,7 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
     of_the_kit |= any({"outer", "yaw"} <= {*words} for words in named.values())
     meanings: dict[str, Meaning] = {}
     bare: dict[tuple[int, str], list[str]] = {}  # channels whose names say a joint, and perhaps a unit, alone
-    for channel in channels:
+    for channel in sorted(channels, key=lambda channel: bool({*ROUGH_WORDS} & {*named.get(channel.name, [])})):
         words = named.get(channel.name, [])
         if of_the_kit:
             joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
@@ -106,9 +107,13 @@ def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
         symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
         if len(joints) != 1 or not symbol:
             continue
-        symbol = _side(symbol, words, channel.unit, robot.joints[joints[0]])
+        about = words_of(without_unit(channel.alias or channel.name))
+        symbol = _side(symbol, about, channel.unit, robot.joints[joints[0]])
         if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
-            meanings[channel.name] = Meaning(symbol, joints[0], "by the joint in its name")
+            reason = "by the joint in its name"
+            if symbol == "tau" and "motor" in words:
+                reason = "CHECK: a study takes the effort at the joint: of the motor it needs scale = <gear ratio>"
+            meanings[channel.name] = Meaning(symbol, joints[0], reason)
     for (joint, measured), names in bare.items():  # `roll (deg)`; `roll actual`, beside `roll current actual`
         symbol = SYMBOL_OF_UNIT.get(measured, "q")
         known = {AT_MOTOR.get(m.symbol, m.symbol) for m in meanings.values() if m.joint == joint}
@@ -146,7 +151,11 @@ def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
 
 def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    motor = "motor" in words or (is_angle(unit) and joint.kind is Kind.PRISMATIC)
+    motor = (
+        "motor" in words
+        or ("m" in words and {"theta", "dtheta"} & {*words})
+        or (is_angle(unit) and joint.kind is Kind.PRISMATIC)
+    )
     return AT_MOTOR.get(symbol, symbol) if motor else symbol
 
 
@@ -164,8 +173,9 @@ def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
 
 def _says_only(joint: Joint, channel: Channel) -> bool:
     """Whether the name of a channel says nothing but the joint, and perhaps a unit."""
-    words = words_of(without_unit(channel.alias or channel.name))
-    return {*words} <= {*words_of(joint.name), *PROCESSED_WORDS, *INSERTION_WORDS}
+    name = channel.alias or channel.name
+    words = {*words_of(without_unit(name))} - {*words_of(unit_in(name)), "in"}
+    return words <= {*words_of(joint.name), *PROCESSED_WORDS, *INSERTION_WORDS}
 
 
 def by_numbers(channels: Sequence[Channel]) -> Holding:

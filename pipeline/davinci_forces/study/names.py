@@ -14,10 +14,10 @@ from davinci_forces.maths.units import OUTSIDE, canonical, measures
 
 # Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
 SIGNAL_WORDS = {
-    "i": ("current", "currents", "amp", "i", "cur", "curr", "strom"),
+    "i": ("current", "currents", "amp", "i", "cur", "curr", "strom", "imotor", "imot"),
     "dq": (
         "velocity", "velocities", "speed", "speeds", "rate", "dq", "qd", "qdot", "vel", "velo", "omega", "dtheta",
-        "geschwindigkeit", "winkelgeschwindigkeit", "drehzahl", "hastighed",
+        "dot", "geschwindigkeit", "winkelgeschwindigkeit", "drehzahl", "hastighed",
     ),
     "tau": ("torque", "torques", "effort", "efforts", "tau", "eff", "trq", "moment", "moments", "drehmoment"),
     "q": (
@@ -34,10 +34,10 @@ COMMAND_WORDS = (
 OTHER_WORDS = {
     "tcp", "pose", "cartesian", "cp", "cv", "cf", "wrench", "tip", "tool", "ee", "ext", "external", "residual",
     "gravity", "friction", "model", "estimated", "predicted", "temperature", "temperatures", "voltage", "error", "err",
-    "acceleration", "dtau", "jaw", "gripper",
+    "acceleration", "ddot", "dtau", "jaw", "gripper",
 }  # fmt: skip
-ROUGH_WORDS = ("raw", "unfiltered")  # a signal of such a name is taken where there is no other
-PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "measured", "actual")  # of no joint
+ROUGH_WORDS = ("raw", "unfiltered", "set")  # a signal of such a name is taken where there is no other
+PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "measured", "actual", "act")  # of no joint
 TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
 TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
 IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
