@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Candidate, CandidatePart, Library, share_parameters, weights_of
-from davinci_forces.identification.chosen import Selection, better, reason
+from davinci_forces.identification.chosen import LAST_DIGIT, Selection, better, reason
 from davinci_forces.identification.observations import CellEquations, Observed
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
@@ -186,6 +186,12 @@ def test_errors_that_differ_by_less_than_the_last_printed_digit_are_equal(differ
     results = [worth(0.1), worth(0.1 + difference)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
     assert ("overfits" in reason(named, results, 0, 0)) == overfits
+
+
+def test_a_candidate_that_fits_as_well_to_the_last_printed_digit_does_not_overfit():
+    results = [worth(0.1), worth(0.2)._replace(fitted=worth(0.1 - 0.9 * LAST_DIGIT).unseen)]
+    named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
+    assert "overfits" not in reason(named, results, 0, 0)
 
 
 def test_an_inertia_has_to_be_positive_at_fifty_poses_of_each_log_or_at_all_of_a_shorter_one():

@@ -101,6 +101,18 @@ def test_no_table_leaves_the_page_and_a_long_one_repeats_its_header(columns: int
 
 
 @poppler
+def test_a_caption_stays_with_the_first_row_of_its_table() -> None:
+    alone = 0
+    for lines in range(24, 36):  # one of these ends where only the caption has room
+        blocks = [*(Prose(f"line {k}") for k in range(lines)), Table("Word.", ("h", "i"), (("first", "2"),) * 20)]
+        pages = read(pdf.render(one(*blocks))).split("\f")
+        [with_caption] = [page for page in pages if "Word." in page]
+        assert "first" in with_caption
+        alone += f"line {lines - 1}" not in with_caption
+    assert 0 < alone < 12
+
+
+@poppler
 @pytest.mark.slow
 def test_no_cell_of_any_table_leaves_the_page() -> None:
     rng = random.Random(1)

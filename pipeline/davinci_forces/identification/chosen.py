@@ -144,8 +144,8 @@ def reason(candidates: Sequence[Candidate], results: Sequence[CrossValidation], 
         )
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))
-    excess = results[closest].score - results[i].score
-    if excess > max(LAST_DIGIT, standard_error(results[closest], results[i])):
+    excess, gain = results[closest].score - results[i].score, training[i] - training[closest]
+    if gain > LAST_DIGIT and excess > max(LAST_DIGIT, standard_error(results[closest], results[i])):
         text += (
             f"; {candidates[closest].name} fits better ({training[closest]:.4f} instead of {training[i]:.4f}) and "
             f"predicts worse ({results[closest].score:.4f}): it overfits"
