@@ -14,7 +14,8 @@ from davinci_forces import robots
 from davinci_forces.maths.signals import columns
 from davinci_forces.robots.robot import Kind
 from davinci_forces.study import reading
-from davinci_forces.study.roles import GUESSED
+from davinci_forces.study.holding import Holding
+from davinci_forces.study.roles import GUESSED, Evidence, roles_of
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.simulation.six_joints import write
 from tests.test_runs import call
@@ -429,6 +430,22 @@ def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
     }  # fmt: skip
     weight = next(entry for entry in reading.read(tmp_path).logs if entry.role == "weight")
     assert (weight.weight.mass, weight.tare) == (0.205, "c_noweight")
+
+
+WORDS_OF_ROLES = {
+    "identification": ("sysid_01", "Ident roll", "train"),
+    "validation": ("verification", "cross_val", "no contact 3", "frei", "tare", "other path"),
+    "contact": ("pull_test", "with_force", "Kontakt", "stoss2", "poke3", "TouchTip", "collision"),
+    "weight": ("hang_100g", "load100", "Gewicht", "payload0p25kg"),
+    "friction": ("constVel", "friction_map"),
+}
+
+
+def test_words_of_several_laboratories_tell_the_role():
+    for role, names in WORDS_OF_ROLES.items():
+        for name in names:
+            [said] = roles_of([Evidence(name, name, Holding())])
+            assert said.role == role, name
 
 
 def test_where_nothing_repeats_all_logs_but_the_one_that_tests_are_identified_from(tmp_path):

@@ -13,12 +13,13 @@ from davinci_forces.study.holding import Holding
 WORDS = {
     "empty": r"(no|without|zero) ?(weight|pay ?load|load|mass)|(weight|payload|load|mass) (none|off|zero)"
     r"|unloaded|empty|tare|0 ?k?g",
-    "free": r"(no|without) ?(contact|touch)|free|in air",
-    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g",
-    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing",
-    "contact": r"contacts?|touch\w*|push\w*|pok\w*|press\w*|collisions?|collid\w*|hits?",
+    "free": r"(no|without) ?(contact|touch)|free|in air|frei|ohne kontakt",
+    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g|gewicht\w*",
+    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe",
+    "contact": r"contacts?|touch\w*|push\w*|pull\w*|pok\w*|press\w*|collisions?|collid\w*|hits?|with ?force|kontakt\w*"
+    r"|stoss|kollision",
     "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",
-    "validation": r"valid\w*|val|hold ?out|verif\w*|(other|another|different) (path|motion|traj\w*)",
+    "validation": r"valid\w*|val|cross ?val|hold ?out|verif\w*|(other|another|different) (path|motion|traj\w*)",
     "identification": r"ident\w*|sys ?id|calib\w*|train\w*",
     "excitation": r"excit\w*|exc",
     "test": r"test|check",
