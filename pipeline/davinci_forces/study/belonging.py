@@ -21,8 +21,9 @@ from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import JOINT_NUMBER, by_file_name, is_angle, with_motion
+from davinci_forces.study.guessing import with_motion
 from davinci_forces.study.holding import Holding, Meaning
+from davinci_forces.study.joint_names import JOINT_NUMBER, by_file_name, is_angle
 from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
 from davinci_forces.study.timing import TimeGuess, samples_of
 from davinci_forces.toml import TomlFile, TomlTable

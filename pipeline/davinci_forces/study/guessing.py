@@ -11,21 +11,17 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.unexplained import smoothed_course
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
-from davinci_forces.maths.units import canonical, measures, size, unit_in
-from davinci_forces.robots.robot import Joint, Kind, Robot
-from davinci_forces.study.holding import BY_FILE, BY_NUMBER, POSITIONS, VELOCITIES, Holding, Meaning
+from davinci_forces.maths.units import measures, size
+from davinci_forces.robots.robot import Robot
+from davinci_forces.study.holding import BY_NUMBER, POSITIONS, VELOCITIES, Holding, Meaning
+from davinci_forces.study.joint_names import AT_MOTOR, by_joint_names, with_one_effort
 from davinci_forces.study.names import (
-    FORCE_WORDS,
     IN_DEGREES,
-    INSERTION_WORDS,
     PROCESSED_WORDS,
-    PSM_JOINTS,
-    ROUGH_WORDS,
     SIGNAL_WORDS,
     Numbered,
     is_time,
     joint_groups,
-    psm_joint,
     stated_unit,
     symbol_of,
     without_unit,
@@ -34,12 +30,6 @@ from davinci_forces.study.names import (
 from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
-AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
-SYMBOL_OF_UNIT = {  # of what a unit measures
-    "angle": "q", "length": "q", "angle rate": "dq", "length rate": "dq", "current": "i", "torque": "tau",
-    "force": "tau",
-}  # fmt: skip
-JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
 
 
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
@@ -87,97 +77,6 @@ def clock_hint(log: Log) -> str:
     return f"rate = {timing.rate!r}, {timing.reason}" if timing.rate else ""
 
 
-def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
-    """Assign channels whose names name a joint of the robot: `Roll motor angle`."""
-    named = {channel.name: words_of(channel.alias or channel.name) for channel in channels if not is_time(channel)}
-    of_the_kit = all(any(label & {*words} for words in named.values()) for label in (INSERTION_WORDS, {"yaw"}))
-    of_the_kit |= any({"outer", "yaw"} <= {*words} for words in named.values())
-    meanings: dict[str, Meaning] = {}
-    bare: dict[tuple[int, str], list[str]] = {}  # channels whose names say a joint, and perhaps a unit, alone
-    for channel in sorted(channels, key=lambda channel: bool({*ROUGH_WORDS} & {*named.get(channel.name, [])})):
-        words = named.get(channel.name, [])
-        if of_the_kit:
-            joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
-        else:
-            joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, channel.alias or channel.name)]
-        if len(joints) == 1 and _says_only(robot.joints[joints[0]], channel):
-            bare.setdefault((joints[0], measures(canonical(stated_unit(channel))) or ""), []).append(channel.name)
-            continue
-        # Beside a joint, a force is its effort; the force at the tip is none.
-        symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
-        if len(joints) != 1 or not symbol:
-            continue
-        about = words_of(without_unit(channel.alias or channel.name))
-        symbol = _side(symbol, about, channel.unit, robot.joints[joints[0]])
-        if (symbol, joints[0]) not in [(m.symbol, m.joint) for m in meanings.values()]:
-            reason = "by the joint in its name"
-            if symbol == "tau" and "motor" in words:
-                reason = "CHECK: a study takes the effort at the joint: of the motor it needs scale = <gear ratio>"
-            meanings[channel.name] = Meaning(symbol, joints[0], reason)
-    for (joint, measured), names in bare.items():  # `roll (deg)`; `roll actual`, beside `roll current actual`
-        symbol = SYMBOL_OF_UNIT.get(measured, "q")
-        known = {AT_MOTOR.get(m.symbol, m.symbol) for m in meanings.values() if m.joint == joint}
-        if AT_MOTOR.get(symbol, symbol) not in known:
-            what = {"q": "position", "dq": "velocity", "i": "current"}.get(symbol, "effort")
-            doubt = len(names) > 1 or measured not in SYMBOL_OF_UNIT
-            reason = f"CHECK: {what}, as its name says no quantity" if doubt else f"{what} of the joint, by its unit"
-            meanings[names[0]] = Meaning(_side(symbol, (), measured, robot.joints[joint]), joint, reason)
-    return Holding(_with_one_effort(meanings), len(robot.joints), robot=robot)
-
-
-def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: int) -> Holding:
-    """Assign the one joint of a log, whose channels do not tell which it is, by the name of its file and folders.
-
-    Numbers of joints in names count from `first`.
-    """
-    words, number = words_of(name), JOINT_NUMBER.search(name)
-    for robot in robots:
-        joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, name)]
-        if len(joints) == 1:
-            named, joint = holding.with_joints(joints).with_reasons(lambda _: BY_FILE), robot.joints[joints[0]]
-            sides = {n: _side(m.symbol, (), holding.units.get(n, ""), joint) for n, m in named.meanings.items()}
-            meanings = {n: replace(m, symbol=sides[n]) for n, m in named.meanings.items()}
-            return replace(named, joints=len(robot.joints), meanings=meanings, robot=robot, labels=())
-    if number and int(number[1]) >= first:
-        return replace(holding.with_joints([int(number[1]) - first]).with_reasons(lambda _: BY_FILE), labels=())
-    return holding
-
-
-def _with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
-    """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
-    with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
-    return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
-
-
-def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:
-    """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    motor = (
-        "motor" in words
-        or ("m" in words and {"theta", "dtheta"} & {*words})
-        or (is_angle(unit) and joint.kind is Kind.PRISMATIC)
-    )
-    return AT_MOTOR.get(symbol, symbol) if motor else symbol
-
-
-def is_angle(unit: str) -> bool:
-    """Whether a unit is of an angle or its rate."""
-    return str(measures(canonical(unit))).startswith("angle")
-
-
-def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
-    parts = words_of(joint.name)
-    last = parts[-1] if not parts[-1].isdecimal() else ""
-    inserts = any(PSM_JOINTS[word] == joint.name for word in INSERTION_WORDS & {*words})
-    return joint.name in name.lower() or set(parts) <= set(words) or last in words or inserts
-
-
-def _says_only(joint: Joint, channel: Channel) -> bool:
-    """Whether the name of a channel says nothing but the joint, and perhaps a unit."""
-    name = channel.alias or channel.name
-    words = {*words_of(without_unit(name))} - {*words_of(unit_in(name)), "in"}
-    return words <= {*words_of(joint.name), *PROCESSED_WORDS, *INSERTION_WORDS}
-
-
 def by_numbers(channels: Sequence[Channel]) -> Holding:
     """Assign joints by the number or label of a channel among those of one name: `q1`, `effort[outer_yaw]`."""
     groups: dict[str, Numbered] = {}
@@ -203,7 +102,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
                 continue
             motor = AT_MOTOR.get(symbol, symbol) if "motor" in words_of(name) else symbol
             meanings[name] = Meaning(motor, joint, reason, "" if units[name] else usual)
-    meanings = _with_one_effort(meanings)
+    meanings = with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
 
@@ -224,7 +123,7 @@ def by_words(channels: Sequence[Channel]) -> Holding:
         name: Meaning(symbol, labels.index(label), f"joint {label!r}")
         for symbol, names in named.items() for label, name in names.items() if label in labels
     }  # fmt: skip
-    return Holding(_with_one_effort(meanings), len(labels), tuple(labels))
+    return Holding(with_one_effort(meanings), len(labels), tuple(labels))
 
 
 def _by_content(log: Log, names: Sequence[str]) -> Holding:

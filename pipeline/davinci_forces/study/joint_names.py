@@ -1,0 +1,142 @@
+"""Assign channels to joints and quantities by the names of the joints of a robot: `Roll motor angle`."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from davinci_forces.logs.log import Channel
+from davinci_forces.maths.units import canonical, measures, unit_in
+from davinci_forces.robots.robot import Joint, Kind, Robot
+from davinci_forces.study.holding import BY_FILE, Holding, Meaning
+from davinci_forces.study.names import (
+    FORCE_WORDS,
+    INSERTION_WORDS,
+    PROCESSED_WORDS,
+    PSM_JOINTS,
+    ROUGH_WORDS,
+    is_time,
+    psm_joint,
+    stated_unit,
+    symbol_of,
+    without_unit,
+    words_of,
+)
+
+AT_MOTOR = {"q": "theta_m", "dq": "dtheta_m"}
+SYMBOL_OF_UNIT = {  # of what a unit measures
+    "angle": "q", "length": "q", "angle rate": "dq", "length rate": "dq", "current": "i", "torque": "tau",
+    "force": "tau",
+}  # fmt: skip
+MOTOR_TORQUE = "CHECK: a study takes the effort at the joint: of the motor it needs scale = <gear ratio>"
+JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
+
+
+def by_joint_names(channels: Sequence[Channel], robot: Robot) -> Holding:
+    """Assign channels whose names name a joint of the robot: `Roll motor angle`."""
+    named = list(_naming_joints(channels, robot))
+    bare = [(channel, joint) for channel, joint in named if _says_only(robot.joints[joint], channel)]
+    meanings: dict[str, Meaning] = {}
+    for channel, joint in (pair for pair in named if pair not in bare):
+        words = _words(channel)
+        # Beside a joint, a force is its effort; the force at the tip is none.
+        symbol = symbol_of(words) or (symbol_of(["tau", *words]) if FORCE_WORDS & {*words} else "")
+        symbol = _side(symbol, words_of(without_unit(_full_name(channel))), channel.unit, robot.joints[joint])
+        if symbol and (symbol, joint) not in [(m.symbol, m.joint) for m in meanings.values()]:
+            reason = MOTOR_TORQUE if symbol == "tau" and "motor" in words else "by the joint in its name"
+            meanings[channel.name] = Meaning(symbol, joint, reason)
+    return Holding(with_one_effort(_by_unit(bare, robot, meanings)), len(robot.joints), robot=robot)
+
+
+def _naming_joints(channels: Sequence[Channel], robot: Robot) -> Iterator[tuple[Channel, int]]:
+    """Yield the channels whose names name one joint of a robot, with the joint; rough signals come last."""
+    signals = [channel for channel in channels if not is_time(channel)]
+    named = [{*_words(channel)} for channel in signals]
+    of_the_kit = all(any(label & words for words in named) for label in (INSERTION_WORDS, {"yaw"}))
+    of_the_kit |= any({"outer", "yaw"} <= words for words in named)
+    for channel in sorted(signals, key=lambda channel: bool({*ROUGH_WORDS} & {*_words(channel)})):
+        words = _words(channel)
+        if of_the_kit:
+            joints = [k for k, joint in enumerate(robot.joints) if joint.name == psm_joint(words)]
+        else:
+            joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, _full_name(channel))]
+        if len(joints) == 1:
+            yield channel, joints[0]
+
+
+def _by_unit(bare: Sequence[tuple[Channel, int]], robot: Robot, meanings: Mapping[str, Meaning]) -> dict[str, Meaning]:
+    """Add what the units of channels tell whose names say a joint alone: `roll (deg)`.
+
+    Without a unit it is a position to be checked: `roll actual`, beside `roll current actual`.
+    """
+    measured = [(joint, measures(canonical(stated_unit(channel))) or "") for channel, joint in bare]
+    added = dict(meanings)
+    for (channel, joint), (_, kind) in zip(bare, measured, strict=True):
+        symbol = SYMBOL_OF_UNIT.get(kind, "q")
+        known = {AT_MOTOR.get(m.symbol, m.symbol) for m in added.values() if m.joint == joint}
+        if AT_MOTOR.get(symbol, symbol) not in known:
+            what = {"q": "position", "dq": "velocity", "i": "current"}.get(symbol, "effort")
+            is_sure = kind in SYMBOL_OF_UNIT and measured.count((joint, kind)) == 1
+            reason = f"{what} of the joint, by its unit" if is_sure else f"CHECK: {what}, as its name says no quantity"
+            added[channel.name] = Meaning(_side(symbol, (), channel.unit, robot.joints[joint]), joint, reason)
+    return added
+
+
+def _full_name(channel: Channel) -> str:
+    return channel.alias or channel.name
+
+
+def _words(channel: Channel) -> list[str]:
+    return words_of(_full_name(channel))
+
+
+def by_file_name(holding: Holding, name: str, robots: Sequence[Robot], first: int) -> Holding:
+    """Assign the one joint of a log, whose channels do not tell which it is, by the name of its file and folders.
+
+    Numbers of joints in names count from `first`.
+    """
+    words, number = words_of(name), JOINT_NUMBER.search(name)
+    for robot in robots:
+        joints = [k for k, joint in enumerate(robot.joints) if _names(joint, words, name)]
+        if len(joints) == 1:
+            named, joint = holding.with_joints(joints).with_reasons(lambda _: BY_FILE), robot.joints[joints[0]]
+            sides = {n: _side(m.symbol, (), holding.units.get(n, ""), joint) for n, m in named.meanings.items()}
+            meanings = {n: replace(m, symbol=sides[n]) for n, m in named.meanings.items()}
+            return replace(named, joints=len(robot.joints), meanings=meanings, robot=robot, labels=())
+    if number and int(number[1]) >= first:
+        return replace(holding.with_joints([int(number[1]) - first]).with_reasons(lambda _: BY_FILE), labels=())
+    return holding
+
+
+def with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
+    """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
+    with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
+    return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
+
+
+def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:
+    """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
+    motor = (
+        "motor" in words
+        or ("m" in words and {"theta", "dtheta"} & {*words})
+        or (is_angle(unit) and joint.kind is Kind.PRISMATIC)
+    )
+    return AT_MOTOR.get(symbol, symbol) if motor else symbol
+
+
+def is_angle(unit: str) -> bool:
+    """Whether a unit is of an angle or its rate."""
+    return str(measures(canonical(unit))).startswith("angle")
+
+
+def _names(joint: Joint, words: Sequence[str], name: str) -> bool:
+    parts = words_of(joint.name)
+    last = parts[-1] if not parts[-1].isdecimal() else ""
+    inserts = any(PSM_JOINTS[word] == joint.name for word in INSERTION_WORDS & {*words})
+    return joint.name in name.lower() or set(parts) <= set(words) or last in words or inserts
+
+
+def _says_only(joint: Joint, channel: Channel) -> bool:
+    """Whether the name of a channel says nothing but the joint, and perhaps a unit."""
+    name = _full_name(channel)
+    words = {*words_of(without_unit(name))} - {*words_of(unit_in(name)), "in"}
+    return words <= {*words_of(joint.name), *PROCESSED_WORDS, *INSERTION_WORDS}
