@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 
 import davinci_forces
 from davinci_forces import robots
+from davinci_forces.logs.log import Channel
 from davinci_forces.maths.signals import columns
+from davinci_forces.robots import davinci
 from davinci_forces.robots.robot import Kind
 from davinci_forces.study import reading
 from davinci_forces.study.holding import Holding
+from davinci_forces.study.joint_names import by_joint_names
 from davinci_forces.study.roles import GUESSED, Evidence, roles_of
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.simulation.six_joints import write
@@ -278,6 +281,15 @@ def test_a_name_tells_the_side_of_the_motor_whose_torque_is_to_be_checked(tmp_pa
         new(path)
         assert held(path.parent)["hand_roll.theta_m"] == "roll_theta_m"
         assert (path.parent / "study.toml").read_text().count("of the motor it needs scale = <gear ratio>") == doubt
+
+
+@pytest.mark.parametrize(
+    ("unit", "symbol"), [("deg", "q"), ("deg/s", "dq"), ("mA", "i"), ("N m", "tau"), ("", "q"), ("V", "")]
+)
+def test_the_unit_of_a_joint_tells_the_quantity(unit, symbol):
+    meanings = by_joint_names([Channel("roll", unit)], davinci.ROBOT).meanings
+    assert [meaning.symbol for meaning in meanings.values()] == [symbol] * bool(symbol)
+    assert all(("CHECK" in meaning.reason) == (not unit) for meaning in meanings.values())
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def _naming_joints(channels: Sequence[Channel], robot: Robot) -> Iterator[tuple[
 
 
 def _by_unit(bare: Sequence[tuple[Channel, int]], robot: Robot, meanings: Mapping[str, Meaning]) -> dict[str, Meaning]:
-    """Add what the units of channels tell whose names say a joint alone: `roll (deg)`.
+    """Add what the units of channels tell whose names say a joint alone: `roll (deg)`, but not `roll (V)`.
 
     Without a unit it is a position to be checked: `roll actual`, beside `roll current actual`.
     """
@@ -73,7 +73,7 @@ def _by_unit(bare: Sequence[tuple[Channel, int]], robot: Robot, meanings: Mappin
     for (channel, joint), (_, kind) in zip(bare, measured, strict=True):
         symbol = SYMBOL_OF_UNIT.get(kind, "q")
         known = {AT_MOTOR.get(m.symbol, m.symbol) for m in added.values() if m.joint == joint}
-        if AT_MOTOR.get(symbol, symbol) not in known:
+        if AT_MOTOR.get(symbol, symbol) not in known and (kind or not stated_unit(channel)):
             what = {"q": "position", "dq": "velocity", "i": "current"}.get(symbol, "effort")
             is_sure = kind in SYMBOL_OF_UNIT and measured.count((joint, kind)) == 1
             reason = f"{what} of the joint, by its unit" if is_sure else f"CHECK: {what}, as its name says no quantity"
