@@ -577,6 +577,13 @@ def test_no_contact_begins_where_the_smoother_has_no_later_samples():
         assert len(measured(late, quiet, entry(role="contact"))) == found
 
 
+def test_no_contact_is_found_where_the_rise_of_the_smoother_is_not_known():
+    quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.5, 0.05, "c", 1, 0.95, 0.01, 0.2)]
+    pushed = np.where((T >= 20) & (T <= 22), 2.0, 0.0)
+    for rise, found in ((0.2, 1), (np.nan, 0)):
+        assert len(measured(track(pushed, smooth_rise=rise), quiet, entry(role="contact"))) == found
+
+
 MOVING = np.ones(len(T))  # [rad/s]
 
 

@@ -40,7 +40,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     detected = [
         event
         for event in detection.events(track.t, *steady_effort(track), level, track.smooth_rise)
-        if steady[np.searchsorted(track.t, event.onset)]
+        if steady[np.searchsorted(track.t, event.onset).clip(0, len(steady) - 1)]  # an unknown rise makes onsets NaN
     ]
     pairs = match_windows(sorted(entry.contact), detected)
     placed = [(window, event, stated) for window, event, stated in pairs if event or not track.at_rest]
