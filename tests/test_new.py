@@ -280,7 +280,8 @@ def test_a_name_tells_the_side_of_the_motor_whose_torque_is_to_be_checked(tmp_pa
         path.write_bytes(lvm([Write(columns, x=t.tolist())], Style(encoding="utf-8-sig")))
         new(path)
         assert held(path.parent)["hand_roll.theta_m"] == "roll_theta_m"
-        assert (path.parent / "study.toml").read_text().count("of the motor it needs scale = <gear ratio>") == doubt
+        text = (path.parent / "study.toml").read_text()
+        assert text.count("a torque of the motor needs scale = <gear ratio>") == doubt
 
 
 @pytest.mark.parametrize(

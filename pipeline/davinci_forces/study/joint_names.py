@@ -27,7 +27,7 @@ SYMBOL_OF_UNIT = {  # of what a unit measures
     "angle": "q", "length": "q", "angle rate": "dq", "length rate": "dq", "current": "i", "torque": "tau",
     "force": "tau",
 }  # fmt: skip
-MOTOR_TORQUE = "CHECK: a study takes the effort at the joint: of the motor it needs scale = <gear ratio>"
+MOTOR_TORQUE = "CHECK: a torque of the motor needs scale = <gear ratio>, as a study takes the effort at the joint"
 JOINT_NUMBER = re.compile(r"(?<![a-z])(?:joint|axis|motor|j)[\s_-]*(\d{1,2})(?!\d)", re.IGNORECASE)
 
 
