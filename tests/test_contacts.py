@@ -572,8 +572,8 @@ def test_a_log_that_identifies_holds_contacts_only_where_its_effort_is_far_from_
 
 def test_no_contact_begins_where_the_smoother_has_no_later_samples():
     quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.5, 0.05, "c", 1, 0.95, 0.01, 0.2)]
-    for start, found in ((39.0, 1), (39.75, 0), (39.9, 0)):
-        late = track(1.0 * (start <= T), smooth_rise=0.2)
+    for rise, start, found in ((0.2, 39.0, 1), (0.2, 39.75, 0), (0.4, 39.25, 1), (0.4, 39.4, 0), (0.05, 39.6, 0)):
+        late = track(1.0 * (start <= T), smooth_rise=rise)
         assert len(measured(late, quiet, entry(role="contact"))) == found
 
 

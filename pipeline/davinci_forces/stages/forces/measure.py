@@ -17,6 +17,7 @@ from davinci_forces.study import LogEntry
 
 Window = tuple[float, float]
 WINDOW_MARGIN = 0.5  # [s] by which a contact may begin before its window, or end after it
+LAST_MOMENTS = 0.5  # [s] of a log in which the low-pass of the motion errs, as it has no later samples
 
 
 def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: Robot) -> Iterator[Contact | Diagnostic]:
@@ -24,7 +25,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
 
     At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
     Outside the windows, what static friction explains while the joint slowly reverses is noted, and is no contact.
-    In the last moments of a log the smoother has no later samples, so no contact begins there.
+    In the last moments of a log smoother and low-pass have no later samples, so no contact begins there.
     A window on a joint at rest counts only if a contact was detected in it.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
     """
@@ -35,7 +36,8 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
-    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - detection.TIP_REACH * track.smooth_rise)
+    last_moments = max(detection.TIP_REACH * track.smooth_rise, LAST_MOMENTS)
+    steady = is_past_transient(track.t) & (track.t <= track.t[-1] - last_moments)
     level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
     detected = [
         event
