@@ -85,6 +85,13 @@ def test_harmonics_that_the_motion_has_are_kept_unless_a_number_is_stated(orders
         assert len([record for record in made if isinstance(record, Diagnostic)]) == warned
 
 
+def test_the_largest_harmonic_that_is_not_kept_is_named_with_its_share_and_none_where_all_are_kept():
+    amplitude = np.array([9.0, 4.0, 1.0, 2.0])  # the mean first
+    kept = {number: harmonics.largest_omitted(amplitude, number) for number in (1, 2, 3)}
+    assert kept == {1: (3, 0.5), 2: (3, 0.5), 3: (0, 0.0)}
+    assert harmonics.largest_omitted(0.0 * amplitude, 1) == (0, 0.0)
+
+
 def test_noise_is_no_harmonic_however_large():
     x = waves(np.arange(1000) / RATE, 10.0) + 0.3 * np.random.default_rng(2).normal(size=1000)
     amplitude = harmonics.amplitudes(x)

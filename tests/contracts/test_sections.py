@@ -543,6 +543,13 @@ def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Conte
     assert marked.x.tolist() == [int(row[2]) for row in table.rows]
 
 
+def test_one_or_two_windows_have_an_axis_of_their_own_and_more_have_none(full: Context):
+    [contact, *_] = full.catalogue.records(Contact)
+    for count, ends in ((1, (0.0, 2.0)), (2, (0.0, 3.0)), (3, None)):
+        windows = replace(contact, **{name: np.ones(count) for name in contact.columns()})
+        assert contacts_section.peak_panel([windows], True).x_range == ends
+
+
 def test_contacts_of_several_joints_at_one_time_are_one_row(full: Context):
     [contact, *_] = full.catalogue.select(Contact, log="tip")
     times = {
