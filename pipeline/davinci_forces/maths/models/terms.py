@@ -28,19 +28,25 @@ from davinci_forces.maths.constants import GRAVITY
 COEFFICIENTS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")
 VISCOUS, COULOMB = COEFFICIENTS.index("dq"), COEFFICIENTS.index("sign(dq)")
 Coefficients = tuple[float, ...]
-Z_OF_MOTION: dict[str, Callable[[Array, Array], Array]] = {  # z of terms that depend on position and velocity only
-    "|dq|": lambda q, dq: np.abs(dq),
-    "|dq| dq": lambda q, dq: np.abs(dq) * dq,
-    "q dq": lambda q, dq: q * dq,
-    "q sign(dq)": lambda q, dq: q * np.sign(dq),
-    "q^2 sign(dq)": lambda q, dq: q**2 * np.sign(dq),
-    "q^2": lambda q, dq: q**2,
-    "q^3": lambda q, dq: q**3,
-    "sin 2q": lambda q, dq: np.sin(2.0 * q),
-    "cos 2q": lambda q, dq: np.cos(2.0 * q),
-    "sin 3q": lambda q, dq: np.sin(3.0 * q),
-    "cos 3q": lambda q, dq: np.cos(3.0 * q),
-}
+SIGN = 'op("sign")(dot(q))'
+# Terms whose z depends on position and velocity only: name, phi in Typst's maths, unit, name of z, z.
+_OF_MOTION: tuple[tuple[str, str, str, str, Callable[[Array, Array], Array]], ...] = (
+    ("viscous friction, difference", "abs(dot(q))", "{effort} s/{position}", "|dq|", lambda q, dq: np.abs(dq)),
+    ("quadratic friction", "abs(dot(q)) dot(q)", "{effort} s^2/{position}^2", "|dq| dq", lambda q, dq: np.abs(dq) * dq),
+    ("viscous friction, slope", "q dot(q)", "{effort} s/{position}^2", "q dq", lambda q, dq: q * dq),
+    ("Coulomb friction, slope", f"q {SIGN}", "{effort}/{position}", "q sign(dq)", lambda q, dq: q * np.sign(dq)),
+    (
+        "Coulomb friction, curvature", f"q^2 {SIGN}", "{effort}/{position}^2", "q^2 sign(dq)",
+        lambda q, dq: q**2 * np.sign(dq),
+    ),
+    ("stiffness, slope", "q^2", "{effort}/{position}^2", "q^2", lambda q, dq: q**2),
+    ("stiffness, curvature", "q^3", "{effort}/{position}^3", "q^3", lambda q, dq: q**3),
+    ("second harmonic, sine", "sin(2 q)", "{effort}", "sin 2q", lambda q, dq: np.sin(2.0 * q)),
+    ("second harmonic, cosine", "cos(2 q)", "{effort}", "cos 2q", lambda q, dq: np.cos(2.0 * q)),
+    ("third harmonic, sine", "sin(3 q)", "{effort}", "sin 3q", lambda q, dq: np.sin(3.0 * q)),
+    ("third harmonic, cosine", "cos(3 q)", "{effort}", "cos 3q", lambda q, dq: np.cos(3.0 * q)),
+)  # fmt: skip
+Z_OF_MOTION = {function: z for *_, function, z in _OF_MOTION}
 
 
 def bias(c: Coefficients, q: Any, dq: Any, z: Any) -> tuple[Any, Any, Any]:
@@ -115,7 +121,7 @@ lifted_mass = Term("lifted mass", "(dot.double(q) - g)", "{inertia}", a=1.0, b={
 gravity_sin = Term("gravity, sine", "g sin(q)", "{mass_moment}", b={"sin q": GRAVITY})
 gravity_cos = Term("gravity, cosine", "g cos(q)", "{mass_moment}", b={"cos q": GRAVITY})
 viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b={"dq": 1.0}, positive=True)
-coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b={"sign(dq)": 1.0}, positive=True)
+coulomb = Term("Coulomb friction", SIGN, "{effort}", b={"sign(dq)": 1.0}, positive=True)
 offset = Term("offset", "1", "{effort}", b={"1": 1.0})
 stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
@@ -125,38 +131,24 @@ def presliding_friction(displacement: float, number: int = 1) -> Term:
 
     Its effort is 0 far from a reversal.  Several such terms count from 1.
     """
-    phi = f'(z_{number} - op("sign")(dot(q)))'
-    b = {"z": 1.0, "sign(dq)": -1.0}
-    return Term(f"presliding friction {number}", phi, "{effort}", b=b, displacement=displacement)
+    name, phi = f"presliding friction {number}", f"(z_{number} - {SIGN})"
+    return Term(name, phi, "{effort}", b={"z": 1.0, "sign(dq)": -1.0}, displacement=displacement)
 
 
 def smooth_sign(width: float) -> Term:
     """The share of Coulomb friction that reverses within velocities of +- `width`, not at once; 0 at higher speed."""
-    phi = '(tanh(dot(q) \\/ dot(q)_"w") - op("sign")(dot(q)))'
+    phi = f'(tanh(dot(q) \\/ dot(q)_"w") - {SIGN})'
     return Term("smooth friction", phi, "{effort}", b={"z": 1.0, "sign(dq)": -1.0}, width=width)
 
 
 def stribeck(decay_velocity: float) -> Term:
     """Additional friction near standstill, which decays e-fold at `decay_velocity`, in the joint's units."""
-    phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
+    phi = f'{SIGN} e^(-(dot(q) \\/ dot(q)_"s")^2)'
     return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, decay_velocity=decay_velocity)
 
 
 OF_MOTION = {
-    name: Term(name, typst, unit, b={"z": 1.0}, of_motion=function)
-    for name, typst, unit, function in (
-        ("viscous friction, difference", "abs(dot(q))", "{effort} s/{position}", "|dq|"),
-        ("quadratic friction", "abs(dot(q)) dot(q)", "{effort} s^2/{position}^2", "|dq| dq"),
-        ("viscous friction, slope", "q dot(q)", "{effort} s/{position}^2", "q dq"),
-        ("Coulomb friction, slope", 'q op("sign")(dot(q))', "{effort}/{position}", "q sign(dq)"),
-        ("Coulomb friction, curvature", 'q^2 op("sign")(dot(q))', "{effort}/{position}^2", "q^2 sign(dq)"),
-        ("stiffness, slope", "q^2", "{effort}/{position}^2", "q^2"),
-        ("stiffness, curvature", "q^3", "{effort}/{position}^3", "q^3"),
-        ("second harmonic, sine", "sin(2 q)", "{effort}", "sin 2q"),
-        ("second harmonic, cosine", "cos(2 q)", "{effort}", "cos 2q"),
-        ("third harmonic, sine", "sin(3 q)", "{effort}", "sin 3q"),
-        ("third harmonic, cosine", "cos(3 q)", "{effort}", "cos 3q"),
-    )
+    name: Term(name, typst, unit, b={"z": 1.0}, of_motion=function) for name, typst, unit, function, _ in _OF_MOTION
 }
 
 TERMS = {t.name: t for t in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)}
