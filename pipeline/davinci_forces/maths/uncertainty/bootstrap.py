@@ -30,70 +30,56 @@ def blocks(N: int, count: int = BOOTSTRAP_BLOCKS) -> list[slice]:
     return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
 
 
-def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block], seed: int = 0) -> float:
+def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block]) -> float:
     """Bootstrap the standard error of a statistic of blocks, by drawing as many blocks with replacement.
 
     A block is whatever the statistic takes: samples, or sums over them.  NaN for a single block.
     """
     if len(parts) < 2:
         return float("nan")
-    return _spread(np.array([statistic([parts[i] for i in draw]) for draw in _draws(len(parts), seed)]), len(parts))
+    return _spread(np.array([statistic([parts[i] for i in draw]) for draw in _draws(len(parts))]), len(parts))
 
 
-def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
+def error_of_mean(values: Sequence[float] | Array) -> float:
     """Bootstrap the standard error of the mean of numbers (n,), one a block."""
-    return _error_of_sums(np.asarray(values), np.ones(len(values), np.int64), seed)
+    return _error_of_sums(np.asarray(values), np.ones(len(values), np.int64))
 
 
-def error_of_pooled_mean(x: Array, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:
+def error_of_pooled_mean(x: Array, function: Callable[[Array], Array] = np.asarray) -> float:
     """Bootstrap the standard error of the mean of samples (N,), in blocks, or of a function of that mean."""
     parts = blocks(len(x))
-    return _error_of_sums(np.array([x[p].sum() for p in parts]), np.array(_lengths(parts)), seed, function)
+    return _error_of_sums(np.array([x[part].sum() for part in parts]), _lengths(parts), function)
 
 
-def _error_of_sums(sums: Array, N: Integers, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:
+def _error_of_sums(sums: Array, N: Integers, function: Callable[[Array], Array] = np.asarray) -> float:
     if len(N) < 2:
         return float("nan")
-    draws = _draws(len(N), seed)
+    draws = _draws(len(N))
     return _spread(function(sums[draws].sum(axis=1) / N[draws].sum(axis=1)), len(N))
 
 
-def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
+def error_of_quantile(x: Array, share: float) -> float:
     """Bootstrap the standard error of a quantile of samples (N,), which are sorted once for all draws."""
-    parts = blocks(len(x))
+    parts, drawn = blocks(len(x)), list[float]()
     if len(parts) < 2:
         return float("nan")
     order = np.argsort(x)
-    before = np.zeros((len(x), len(parts)), np.int64)  # samples of each block up to each sorted sample
-    before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
-    np.cumsum(before, axis=0, out=before)
-    draws = _draws(len(parts), seed)
-    times = np.sum(draws[:, :, None] == np.arange(len(parts)), axis=1)  # how often each draw takes each block
-    place = share * (times @ _lengths(parts) - 1)
-    below, above = (x[order[_reached(before, times, whole)]] for whole in (np.floor(place), np.ceil(place)))
-    return _spread(below + (above - below) * (place % 1.0), len(parts))
+    block = np.repeat(np.arange(len(parts)), _lengths(parts))[order]
+    for draw in _draws(len(parts)):
+        upto = np.cumsum(np.bincount(draw, minlength=len(parts))[block])  # drawn samples up to each sorted one
+        place = share * (upto[-1] - 1)  # interpolated between samples, as in `np.quantile`
+        below, above = x[order[np.searchsorted(upto, [np.floor(place), np.ceil(place)], side="right")]]
+        drawn.append(below + (above - below) * (place % 1.0))
+    return _spread(np.array(drawn), len(parts))
 
 
-def _reached(before: Integers, times: Integers, place: Array) -> Integers:
-    """Index (DRAWS,) of the first sorted sample with more than `place` (DRAWS,) drawn samples up to it, by bisection.
-
-    `before` (N, n) counts the samples of each block; `times` (DRAWS, n) is how often a draw takes the block.
-    """
-    low, high = np.zeros(len(times), np.int64), np.full(len(times), len(before) - 1)
-    while (low < high).any():
-        middle = (low + high) // 2
-        more = np.einsum("db,db->d", before[middle], times) > place
-        low, high = np.where(more, low, middle + 1), np.where(more, middle, high)
-    return low
+def _lengths(parts: Sequence[slice]) -> Integers:
+    return np.array([part.stop - part.start for part in parts])
 
 
-def _lengths(parts: Sequence[slice]) -> list[int]:
-    return [part.stop - part.start for part in parts]
-
-
-def _draws(n: int, seed: int) -> Integers:
+def _draws(n: int) -> Integers:
     """Indices (DRAWS, n) of the n blocks that each draw takes, with replacement."""
-    return np.random.default_rng(seed).integers(0, n, (DRAWS, n))
+    return np.random.default_rng(0).integers(0, n, (DRAWS, n))
 
 
 def _spread(drawn: Array, n: int) -> float:
@@ -118,8 +104,8 @@ def root_mean_square(x: Array, scale: Array | None = None) -> tuple[float, float
     The standard error is that of R = mean x^2 / mean y^2, from the mean of x^2 - R y^2 over blocks.
     """
     parts = blocks(len(x))
-    N = np.array(_lengths(parts))
-    sums, scales = (N if y is None else np.array([y[part] @ y[part] for part in parts]) for y in (x, scale))
+    N = _lengths(parts)
+    sums, scales = (1.0 * N if y is None else np.array([y[part] @ y[part] for part in parts]) for y in (x, scale))
     power = float(scales.sum() / N.sum()) or 1.0
     ratio = float(sums.sum() / N.sum()) / power
     return root(ratio, _error_of_sums(sums - ratio * scales, N) / power)
