@@ -14,12 +14,10 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.chain import FIXED, ChainFrame
 
-Z = np.array([0.0, 0.0, 1.0])
-
 
 def placed_frame(
-    name: str, before: int, placement: Array, axis: Array = Z, coordinate: int = FIXED, sign: int = 1,
-    bias: float = 0.0, slides: bool = False, parameters: Array = ChainFrame._field_defaults["parameters"],
+    name: str, before: int, placement: Array, axis: Array, coordinate: int, sign: int, bias: float, slides: bool,
+    parameters: Array,
 ) -> ChainFrame:  # fmt: skip
     """The frame with a placement (4, 4) [m] in its parent frame, which moves along or about a unit `axis` (3,) of it.
 
