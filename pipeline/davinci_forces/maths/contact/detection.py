@@ -27,14 +27,13 @@ minus the modelled effort, because a smoother spreads a part of a push out of it
 errors if free motion holds few windows.
 """
 
-from collections.abc import Iterator
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, runs
 from davinci_forces.maths.contact.unexplained import SIGMA
+from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 HALF = 0.5  # of what is rounded off a triangle, which a peak loses on average, with an error as large
@@ -84,8 +83,8 @@ def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
     return alarm_level(rms, 0.0, free_motion_statistics(tau_ext, free, rate).crossings)
 
 
-def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:
-    """Yield the contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
+def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> list[Event]:
+    """The contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
 
     They exceed the `level`, () or (N,).  `rise` [s] is the duration T_s that the smoother gives a step.  Two peaks of
     one sign are one contact if the effort between them stays above half of the smaller one.
@@ -105,7 +104,7 @@ def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: flo
         if event.release > following.onset:
             middle = 0.5 * (event.release + following.onset)
             contacts[i], contacts[i + 1] = event._replace(release=middle), following._replace(onset=middle)
-    yield from contacts
+    return contacts
 
 
 def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_stop: int) -> bool:
@@ -114,16 +113,14 @@ def is_one_contact(size: Array, start: int, stop: int, next_start: int, next_sto
     return bool(size[stop:next_start].min(initial=smaller) > 0.5 * smaller > 0.0)
 
 
-def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
-    """Yield start and stop of the runs of one sign (N,); runs of the same sign with a short gap are merged."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]]))).tolist()
-    merged: list[tuple[int, int]] = []
-    for a, b in ((a, b) for a, b in pairwise(edges) if side[a] != 0.0):
+def sign_runs(t: Array, side: Array) -> list[tuple[int, int]]:
+    """Start and stop of the runs of one sign (N,); runs of the same sign with a short gap are merged."""
+    merged = list[tuple[int, int]]()
+    for a, b in ((run.start, run.stop) for run in segments(side) if side[run.start] != 0.0):
         if merged and t[a] - t[merged[-1][1] - 1] <= MAX_GAP_CONTACT and side[a] == side[merged[-1][0]]:
-            merged[-1] = (merged[-1][0], b)
-        else:
-            merged.append((a, b))
-    yield from merged
+            a = merged.pop()[0]
+        merged.append((a, b))
+    return merged
 
 
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
@@ -139,14 +136,9 @@ def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int,
 
 
 def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
-    """Time at which a size, followed inwards from sample k, first reaches a level."""
+    """Time at which a size, near sample k, rises inwards to a level, interpolated between samples."""
     while size[k] < level:
         k += inwards
-    return outer_crossing(t, size, k, inwards, level)
-
-
-def outer_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
-    """Time at which a size, followed outwards from sample k, falls below a level, interpolated between samples."""
     while 0 <= k - inwards < len(t) and size[k - inwards] >= level:
         k -= inwards
     outer = k - inwards
@@ -185,10 +177,10 @@ def summarise(
     """
     (tau_ext, std, direct), (start, end) = effort, window
     within = (t >= start) & (t <= end)
-    inside = tau_ext[within]
+    times, inside = t[within], tau_ext[within]
     if not len(inside):
         return None
-    duration, edges = end - start, np.concatenate([[start], 0.5 * (t[within][1:] + t[within][:-1]), [end]])
+    duration, edges = end - start, np.concatenate([[start], 0.5 * (times[1:] + times[:-1]), [end]])
     # Each sample counts for the time around it, within window and log; a log of one sample, too.
     shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
     mean = float(np.average(direct[within], weights=shares))

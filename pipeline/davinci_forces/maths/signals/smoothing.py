@@ -1,10 +1,11 @@
 """Velocities and accelerations of motion that does not repeat: zero-phase low-pass, then differences."""
 
-from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array, Integers, row_blocks
 
@@ -108,13 +109,10 @@ def _delay(x: Array, samples: float) -> Array:
     return delayed
 
 
-def segments(segment: Integers) -> Iterator[slice]:
-    """Yield the runs of equal numbers (N,) in order, such as the segments of a signal between gaps."""
-    if len(segment) == 0:
-        return
+def segments(segment: NDArray[Any]) -> list[slice]:
+    """The runs of equal numbers (N,) in order, such as the segments of a signal between gaps."""
     edges = [0, *(np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist(), len(segment)]
-    for start, stop in pairwise(edges):
-        yield slice(start, stop)
+    return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
 
 
 def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:

@@ -57,4 +57,4 @@ def longest_run(t: Array, rate: float) -> slice:
 
 def unbroken(t: Array, gap: float) -> list[slice]:
     """Split the times (N,) into runs that are no more than `gap` [s] apart."""
-    return list(segments(np.cumsum(np.append(False, np.diff(t) > gap)[: len(t)], dtype=np.int32)))
+    return segments(np.cumsum(np.append(False, np.diff(t) > gap)[: len(t)], dtype=np.int32))

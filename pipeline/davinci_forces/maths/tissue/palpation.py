@@ -119,7 +119,7 @@ def parts(probing: Probing, windows: Sequence[tuple[float, float]]) -> list[slic
         bounds = [np.searchsorted(probing.t, (start, np.nextafter(end, np.inf))) for start, end in sorted(windows)]
         return [slice(int(a), int(b)) for a, b in bounds if b > a]
     if np.any(probing.push != probing.push[0]):
-        return list(segments(probing.push))
+        return segments(probing.push)
     return between_troughs(probing.depth[:, 0] if probing.depth.shape[1] == 1 else probing.size)
 
 
