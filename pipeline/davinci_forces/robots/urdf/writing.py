@@ -8,7 +8,7 @@ acceleration, missing limits or drives.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -32,6 +32,7 @@ def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
+    chain, bodies, axes = _in_named_frames(robot.chain, robot.bodies)
     title, *remarks = (re.sub("-(?=-|$)", "- ", x) for x in (robot.title, *remarks))  # an XML comment has no --
     weightless = "" if robot.bodies else "; the masses of its links are not known"
     lines = [
@@ -39,59 +40,43 @@ def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple
         f"<!-- {title}, in m, rad and kg, z up{weightless} -->",
         *(f"<!-- {remark} -->" for remark in remarks),
         f"<robot name={quoteattr(robot.name)}>",
-        f"  <link name={quoteattr(robot.chain.names[0])}/>",
-        *(f"  {line}" for line in _body(_turned(robot, robot.chain, friction or {}), robot.chain)),
-        "</robot>",
+        f"  <link name={quoteattr(chain.names[0])}/>",
     ]
-    return "\n".join(lines) + "\n"
-
-
-class _Turned(NamedTuple):
-    """A robot in the frames of URDF: each on its joint axis, in any orientation."""
-
-    robot: Robot
-    links: tuple[str, ...]  # names of the bodies, the base first (L + 1,)
-    placement: Array  # (L, 4, 4)
-    axis: Array  # (L, 3)
-    bodies: Bodies | None
-    offset: Array  # poses of the chain's frames in their bodies (F, 4, 4)
-    friction: Mapping[str, tuple[float, float]]
-
-
-def _turned(robot: Robot, chain: Chain, friction: Mapping[str, tuple[float, float]]) -> _Turned:
-    """Express the robot in the named frames of its links, as far as these are on the joint axes."""
-    frames = chain.of_links.copy()
-    # Where the named frame is not at the joint, the frame of the dynamics is kept.
-    frames[frames[:, :3, 3].any(axis=1)] = np.eye(4)
-    by_body = np.concatenate([np.eye(4)[None], frames])
-    back = np.linalg.inv(by_body)
-    return _Turned(
-        robot, (chain.names[0], *chain.links), back[chain.parent] @ chain.placement @ frames, back[1:, :3, 2],
-        robot.bodies.in_frames(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset, friction,
-    )  # fmt: skip
-
-
-def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
-    """The lines of all links and joints, and of the frames that are fixed to links."""
     moved = set[int]()
     for i, coordinate in enumerate(chain.coordinate.tolist()):
-        yield from _link(turned, i)
-        yield from _joint(turned, chain, i, coordinate in moved)
+        body = [*_link(chain, bodies, i), *_joint(robot, chain, i, axes[i], coordinate in moved, friction or {})]
+        lines += [f"  {line}" for line in body]
         moved.add(coordinate)
-    taken = set(turned.links)
-    for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
+    return "\n".join([*lines, *(f"  {line}" for line in _frames(chain)), "</robot>"]) + "\n"
+
+
+def _in_named_frames(chain: Chain, bodies: Bodies | None) -> tuple[Chain, Bodies | None, Array]:
+    """The chain and its bodies in the named frames of the links, as far as these are on joint axes; and the axes."""
+    frames = chain.of_links
+    # Where the named frame is not at the joint, the frame of the dynamics is kept.
+    frames[frames[:, :3, 3].any(axis=1)] = np.eye(4)
+    back = np.linalg.inv(np.concatenate([np.eye(4)[None], frames]))
+    placement, offset = back[chain.parent] @ chain.placement @ frames, back[chain.body] @ chain.offset
+    turned = bodies.in_frames(back[1:]) if bodies else None
+    return replace(chain, placement=placement, offset=offset), turned, back[1:, :3, 2]
+
+
+def _frames(chain: Chain) -> Iterator[str]:
+    """The lines of the frames that are fixed to links."""
+    bodies, taken = (chain.names[0], *chain.links), {chain.names[0], *chain.links}
+    for name, body, offset in [*zip(chain.names, chain.body.tolist(), chain.offset, strict=True)][1:]:
         if name not in taken or not np.allclose(offset, np.eye(4), rtol=0, atol=FRAME_TOLERANCE):
             while name in taken:  # a suffix distinguishes a frame from a link of the same name
                 name = f"{name}_frame"
             taken.add(name)
-            yield from _fixed(name, turned.links[body], offset)
+            yield from _fixed(name, bodies[body], offset)
     if TIP not in taken:  # readers recognise the tip by this name
         at = chain.names.index(chain.tip)
-        yield from _fixed(TIP, turned.links[chain.body[at]], turned.offset[at])
+        yield from _fixed(TIP, bodies[chain.body[at]], chain.offset[at])
 
 
-def _link(turned: _Turned, i: int) -> Iterator[str]:
-    name, bodies = quoteattr(turned.links[i + 1]), turned.bodies
+def _link(chain: Chain, bodies: Bodies | None, i: int) -> Iterator[str]:
+    name = quoteattr(chain.links[i])
     if bodies is None:
         yield f"<link name={name}/>"
         return
@@ -106,23 +91,24 @@ def _link(turned: _Turned, i: int) -> Iterator[str]:
     yield "</link>"
 
 
-def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]:
+def _joint(
+    robot: Robot, chain: Chain, i: int, axis: Array, mimics: bool, friction: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
     """The lines of a link's joint: an independent joint, or a joint that mimics it."""
-    robot, k = turned.robot, int(chain.coordinate[i])
-    parent, child = turned.links[chain.parent[i]], turned.links[i + 1]
+    k, parent, child = int(chain.coordinate[i]), (chain.names[0], *chain.links)[chain.parent[i]], chain.links[i]
     coordinate = robot.coordinates[k]
     limits = robot.joints[k].limits if k < len(robot.joints) else UNLIMITED
     bounded = bool(np.isfinite(limits.q).all())
     kind = Kind.PRISMATIC.value if chain.slides[i] else Kind.REVOLUTE.value if bounded else "continuous"
     name = f"{coordinate} of {child}" if mimics else coordinate
     yield f'<joint name={quoteattr(name)} type="{kind}">'
-    yield from _origin(parent, child, turned.placement[i])
-    yield f'  <axis xyz="{_numbers(turned.axis[i])}"/>'
+    yield from _origin(parent, child, chain.placement[i])
+    yield f'  <axis xyz="{_numbers(axis)}"/>'
     yield f"  <limit {_limits(limits, bounded or bool(chain.slides[i]))}/>"
     if mimics:
         yield f'  <mimic joint={quoteattr(coordinate)} multiplier="1" offset="0"/>'
-    elif coordinate in turned.friction:
-        yield '  <dynamics damping="{}" friction="{}"/>'.format(*map(_number, turned.friction[coordinate]))
+    elif coordinate in friction:
+        yield '  <dynamics damping="{}" friction="{}"/>'.format(*map(_number, friction[coordinate]))
     yield "</joint>"
 
 
