@@ -87,9 +87,9 @@ def test_at_a_singular_pose_the_force_is_not_known_and_elsewhere_it_is():
 def test_a_centimetre_from_the_remote_centre_is_near_singular_and_the_box_of_the_thesis_is_not():
     centre = tip_force.singular_slides(DAVINCI, 0.0)[0]
     J, _ = kinematics.jacobian(DAVINCI, [[0.0, 0.0, centre + lever] for lever in (-0.004, -0.2)])
-    assert list(tip_force.condition(J) > tip_force.NEAR_SINGULAR) == [True, False]
+    assert list(np.linalg.cond(J) > tip_force.NEAR_SINGULAR) == [True, False]
     grid = np.stack(np.meshgrid(*[np.linspace(*joint.limits.q, 11) for joint in ARMS["davinci"].joints]), -1)
-    assert tip_force.condition(kinematics.jacobian(DAVINCI, grid.reshape(-1, 3))[0]).max() < tip_force.NEAR_SINGULAR
+    assert np.linalg.cond(kinematics.jacobian(DAVINCI, grid.reshape(-1, 3))[0]).max() < tip_force.NEAR_SINGULAR
 
 
 def test_the_half_axes_of_the_ellipsoid_make_up_the_covariance():

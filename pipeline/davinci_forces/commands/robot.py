@@ -116,7 +116,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "frames": frames, "tip": kinematics.tip(chain, pose).tolist(),
         "remote_centre": kinematics.remote_centre(chain).tolist(),
         "jacobian_v": J_v.tolist(), "jacobian_w": J_w.tolist(), **_dynamics(robot, pose, rates),
-        "condition": float(tip_force.condition(J_v[..., : tip_force.ARM])) if has_force and not singular else None,
+        "condition": float(np.linalg.cond(J_v[..., : tip_force.ARM])) if has_force and not singular else None,
         "warnings": [*_outside(robot, q), *([_singular(chain, q)] if singular else [])], "joints": _joints(robot),
     }  # fmt: skip
 

@@ -8,7 +8,6 @@ import numpy as np
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
-from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, jacobian, tip
@@ -41,7 +40,7 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
     if limited:
         grid = np.array(list(product(*(np.linspace(low, high, GRID_POINTS) for low, high in limits.tolist()))))
         # Where the Jacobian is singular, the largest number stands for infinity, which no record holds.
-        condition = np.minimum(tip_force.condition(jacobian(chain, grid)[0]), np.finfo(float).max)
+        condition = np.minimum(np.linalg.cond(jacobian(chain, grid)[0]), np.finfo(float).max)
     worst = float(condition.max()) if limited else float("nan")
     yield links(robot, chain, worst if worst < np.finfo(float).max else float("nan"))
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})

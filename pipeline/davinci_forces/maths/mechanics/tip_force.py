@@ -21,8 +21,10 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import jacobian
 
-# Above this condition number a pose is singular: the efforts of the first three joints practically do not determine one
-# direction of the force.  This is 0.1 mm from an exact singularity.  Within Table 6.2 the number is at most 60.
+# The condition number of J_v is the largest ratio of the force errors in two directions.  Like the Jacobian, it mixes
+# metres per radian with metres per metre.  Above this number a pose is singular: the efforts of the first three joints
+# practically do not determine one direction of the force.  This is 0.1 mm from an exact singularity.  Within Table 6.2
+# the number is at most 60.
 SINGULAR = 1e4
 # Above this condition number a force is marked: its error in one direction is a hundred times the error in another, for
 # example if a joint has a lever of about a centimetre at the tip.  Poses within Table 6.2 stay below.
@@ -32,18 +34,10 @@ ARM = 3  # coordinates of the reduced Jacobian
 CHI_SQUARED_95 = 7.814727903251179  # 95 % quantile of chi-squared with 3 degrees of freedom
 
 
-def condition(J_v: ArrayLike) -> Array:
-    """Condition number (...) of J_v (..., 3, n): the largest ratio of the force errors in two directions.
-
-    Like the Jacobian, it mixes metres per radian with metres per metre.
-    """
-    return np.asarray(np.linalg.cond(np.asarray(J_v, float)))
-
-
 def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:
     """Whether the first three joints do not determine the force at the tip, at q (..., n).  (7.26)"""
     J_v, _ = jacobian(chain, q)
-    return np.asarray(condition(J_v[..., :ARM]) > SINGULAR)
+    return np.asarray(np.linalg.cond(J_v[..., :ARM]) > SINGULAR)
 
 
 def singular_slides(chain: Chain, q_pitch: float) -> Array:
@@ -68,7 +62,7 @@ def from_efforts(J: ArrayLike, tau_ext: ArrayLike, C_tau: ArrayLike) -> tuple[Ar
     J, tau_ext = np.asarray(J, float), np.asarray(tau_ext, float)
     C_tau = np.broadcast_to(np.asarray(C_tau, float), J.shape)
     w, C_w = np.full(tau_ext.shape, np.nan), np.full(J.shape, np.nan)
-    regular = condition(J) <= SINGULAR
+    regular = np.linalg.cond(J) <= SINGULAR
     inverse = np.linalg.inv(np.swapaxes(J[regular], -1, -2))  # J^-T
     w[regular] = np.einsum("...ij,...j->...i", inverse, tau_ext[regular])
     C_w[regular] = inverse @ C_tau[regular] @ np.swapaxes(inverse, -1, -2)

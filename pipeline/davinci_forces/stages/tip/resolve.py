@@ -9,7 +9,7 @@ from davinci_forces.maths.contact.detection import HALF, rounded_off, without_ro
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, is_singular, matrix, shared_correlations
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, is_singular, matrix, shared_correlations
 from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records.forces import Contact, Track
@@ -154,7 +154,7 @@ def forces_in_block(chain: Chain, of_joints: Array, R: Array) -> Array:
     q, tau_ext, std = np.split(of_joints, 3, axis=1)
     J, _ = jacobian(chain, q)
     f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, R))
-    return np.column_stack([f, C.reshape(-1, 9), condition(J), tip(chain, q)])
+    return np.column_stack([f, C.reshape(-1, 9), np.linalg.cond(J), tip(chain, q)])
 
 
 def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
