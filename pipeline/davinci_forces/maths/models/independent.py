@@ -36,10 +36,7 @@ class IndependentJoint:
         """The one joint of the model."""
         return (self.group,)
 
-    @property
-    def efforts(self) -> tuple[str, ...]:
-        """The one joint of the model."""
-        return self.joints
+    efforts = joints
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -62,10 +59,8 @@ class IndependentJoint:
         q, dq, ddq = (x[:, 0] for x in motion[:3])
         valid, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
         for i, term in enumerate(self.terms):
-            z: Array | float = 0.0
-            if term.has_z:
-                z, z_valid = friction_state(motion, 0, term)
-                valid &= z_valid
+            z, z_valid = friction_state(motion, 0, term)
+            valid &= z_valid
             add(term, q, dq, ddq, z, Phi[:, 0, i])
         return Regressor(Phi, valid)
 
@@ -74,12 +69,9 @@ class IndependentJoint:
 
         The derivative of sign(dq) is taken as zero, and states z of friction as constant.
         """
-        q, dq = motion.q[:, 0], motion.dq[:, 0]
-        columns = []
-        for term in self.terms:
-            _, by_q, by_dq = bias(term.coefficients, q, dq, 0.0)
-            columns.append(np.stack([by_q + 0.0 * q, by_dq + 0.0 * q, term.a + 0.0 * q], axis=1))
-        return np.stack(columns, axis=-1)
+        c = np.array([term.coefficients for term in self.terms]).T
+        _, by_q, by_dq = bias(tuple(c), motion.q, motion.dq, 0.0)
+        return np.stack(np.broadcast_arrays(by_q, by_dq, [term.a for term in self.terms]), axis=1)
 
     def inertia_columns(self, q: Array) -> Array:
         """Derivatives (N, 1, 1, p) of M at q (N, 1) by the parameters."""
