@@ -56,13 +56,11 @@ def interpolate_sensor(t: Array, clock: Array, f: Array, reach: float) -> Array:
 
 def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     """Errors of a force (N, k) with covariance (N, k, k), against that of a sensor (N, k)."""
-    e, k = estimated - measured, measured.shape[1]
-    spans = np.ptp(measured, axis=0)
+    e, k, span = estimated - measured, measured.shape[1], float(np.ptp(measured, axis=0).mean())
     limit = {1: NORMAL_95**2, 3: CHI_SQUARED_95}[k]
     inside = np.einsum("ni,ni->n", e, np.linalg.solve(C, e[..., None])[..., 0]) <= limit
     parts = blocks(len(e))
     errors_of, covered = [e[part] for part in parts], [inside[part].astype(float)[:, None] for part in parts]
-    span = float(spans.mean())
     values = [(f(errors_of), standard_error(f, errors_of)) for f in (_rmse, _bias, _mean_rmse)]
     (rmse, rmse_std), (bias, bias_std), (typical, typical_std) = values
     relative, relative_std = (x / span if span else float("nan") for x in (typical, typical_std))
@@ -126,8 +124,7 @@ def _vertex(c: Array, step: float) -> float:
 def reach(c: Array, i: int) -> int:
     """Number of lags on both sides of lag i that belong to its peak; 0 if lag i is no peak."""
     near = min(MAX_PEAK_NEIGHBOURS, i, len(c) - 1 - i)
-    below = [k for k in range(1, near + 1) if min(c[i - k], c[i + k]) < 0.5 * c[i]]
-    return below[0] - 1 if below else near
+    return next((k - 1 for k in range(1, near + 1) if min(c[i - k], c[i + k]) < 0.5 * c[i]), near)
 
 
 def _rmse(parts: list[Array]) -> float:
