@@ -83,16 +83,16 @@ def test_one_sample_is_no_exception(compiled):
 
 @SIZES
 def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
-    arm, rest = rigid_body.moving_tree(CHAIN, BODIES, n), np.zeros(n)
+    arm = rigid_body.moving_tree(CHAIN, BODIES, n)
     mass_and_bias = kernels.mass_and_bias
 
     @njit
-    def step(arm, q, dq, rest, M, bias):
-        mass_and_bias(arm, GRAVITY, q, dq, rest, M, bias)
+    def step(arm, q, dq, M, bias):
+        mass_and_bias(arm, GRAVITY, q, dq, M, bias)
 
     M, bias = np.empty((n, n)), np.empty(n)
     for q, dq in motions(n)[:2].swapaxes(0, 1)[:5]:
-        step(arm, q, dq, rest, M, bias)
+        step(arm, q, dq, M, bias)
         np.testing.assert_allclose(M, rigid_body.mass_matrix(CHAIN, BODIES, q), rtol=0, atol=1e-13)
         still = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, 0 * q)
         np.testing.assert_allclose(bias, still, rtol=0, atol=1e-12)
@@ -100,10 +100,10 @@ def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
 
 @pytest.mark.parametrize(("n", "least"), [(3, 1.0), (6, 0.1)])
 def test_an_arm_that_falls_freely_keeps_its_energy(n, least):
-    arm, M, bias, rest = rigid_body.moving_tree(CHAIN, BODIES, n), np.empty((n, n)), np.empty(n), np.zeros(n)
+    arm, M, bias = rigid_body.moving_tree(CHAIN, BODIES, n), np.empty((n, n)), np.empty(n)
 
     def rates(_, x):
-        kernels.mass_and_bias(arm, GRAVITY, x[:n].copy(), x[n:].copy(), rest, M, bias)
+        kernels.mass_and_bias(arm, GRAVITY, x[:n].copy(), x[n:].copy(), M, bias)
         return np.concatenate([x[n:], np.linalg.solve(M, -bias)])
 
     start = np.concatenate(motions(n, 0.5)[:2, 0])
@@ -122,7 +122,7 @@ from davinci_forces.robots.davinci import BODIES, CHAIN
 rigid_body.COMPILE_FROM = 1
 q, dq, ddq = np.random.default_rng(0).uniform(-3, 3, (3, 1001, 6))
 M, bias, J, arm = np.empty((6, 6)), np.empty(6), np.empty((3, 6)), rigid_body.moving_tree(CHAIN, BODIES, 6)
-kernels.mass_and_bias(arm, 9.81, q[0], dq[0], ddq[0], M, bias)
+kernels.mass_and_bias(arm, 9.81, q[0], dq[0], M, bias)
 kernels.place_and_jacobian(arm, 8, (0.1, 0.2, 0.3), q[0], J)
 results = (
     rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq), rigid_body.mass_matrix(CHAIN, BODIES, q),

@@ -152,7 +152,7 @@ def frictionless() -> tuple[Any, Any, Any]:
     n = 3
     none = what.families["matched"].friction._replace(**{f"coulomb_{d}": np.zeros(n) for d in ("up", "down")})
     none = none._replace(static_up=np.zeros(n), static_down=np.zeros(n))
-    body = JointConstraints(none, np.full(n, -1.0), np.full(n, 1.0), np.ones(n, bool))
+    body = JointConstraints(none, np.full(n, -1.0), np.full(n, 1.0))
     plant = arm(robot.chain, robot.bodies, what.motors.gear_ratio**2 * what.rotors)
     return plant, body, what.motors._replace(encoder_step=np.zeros(n), current_limit=np.full(n, 100.0))
 

@@ -146,8 +146,8 @@ def _axis(scenario: HapticScenario, q: float) -> Axis:
     motors, law, friction_of_body, loops, state = map(records, parts)
     low, high = (np.array([stop]) for stop in scenario.stops)
     return Axis(
-        motors, law, friction_of_body, loops, state, np.zeros(1), np.ones(1, np.bool_), np.array([[body.inertia]]),
-        np.array([body.gravity]), (low, high), scenario.exact,
+        motors, law, friction_of_body, loops, state, np.zeros(1), np.array([[body.inertia]]), np.array([body.gravity]),
+        (low, high), scenario.exact,
     )  # fmt: skip
 
 

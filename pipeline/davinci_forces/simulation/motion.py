@@ -72,14 +72,14 @@ def _in_closed_loop(scenario: Scenario, simulated_arm: SimulatedArm, log: Simula
     Raises BadScenario if the motion diverges, for example because the gains are too high for the tick.
     """
     chain, joints = scenario.robot.known_chain, scenario.robot.joints
-    names, n = [joint.name for joint in joints], len(joints)
+    names = [joint.name for joint in joints]
     ticks = round(1 / (scenario.rate * simulated_arm.tick))
     skipped, samples = round(log.lead * scenario.rate), round(log.duration * scenario.rate)
     t = np.arange(-skipped, samples) / scenario.rate
     reference = np.column_stack([log.position(name, t) for name in names])
     stops = np.array([scenario.joints[name].stops for name in names])
     friction = simulated_arm.families[log.family].friction
-    body = JointConstraints(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
+    body = JointConstraints(friction, *np.ascontiguousarray(stops.T))
     plant = arm(chain, scenario.robot.known_bodies, simulated_arm.motors.gear_ratio**2 * simulated_arm.rotors)
     clock = Timing(simulated_arm.tick, ticks)
     instants = np.arange(len(t) * ticks, dtype=np.float64) * simulated_arm.tick - log.lead

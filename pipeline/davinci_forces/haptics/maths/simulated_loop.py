@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store, compile_function, inline
 from davinci_forces.maths.simulation.actuators import Device
 from davinci_forces.maths.simulation.control import drive, follow, read
@@ -56,7 +56,6 @@ class Axis(NamedTuple):
     loops: Any
     state: Any
     tau: Array  # (1,) [N]
-    moving: Booleans  # (1,)
     inertia: Array  # (1, 1) [kg]
     gravity: Array  # (1,) [N]
     stops: tuple[Array, Array]  # (1,) each [m], from the tissue's surface
@@ -189,7 +188,7 @@ def _move_arm(arm: Any, tissue: Any, h: float) -> None:
     q, dq, free = np.empty(1), np.empty(1), np.empty(1)
     middle(arm.state, h, q, dq)
     free[0] = arm.tau[0] - tissue_force(tissue, q[0], dq[0])
-    step(arm.inertia, arm.gravity, free, arm.friction, arm.stops[0], arm.stops[1], arm.state, arm.moving, h)
+    step(arm.inertia, arm.gravity, free, arm.friction, arm.stops[0], arm.stops[1], arm.state, h)
 
 
 @inline

@@ -33,8 +33,8 @@ def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
 
 
 @compile_and_store
-def mass_and_bias(tree: Any, gravity: float, q: Any, dq: Any, ddq: Any, M: Any, bias: Any) -> None:
-    """Put M(q) (n, n) and the effort (n,) of one sample into arrays; with ddq 0 this is C dq + G.  (4.41)
+def mass_and_bias(tree: Any, gravity: float, q: Any, dq: Any, M: Any, bias: Any) -> None:
+    """Put M(q) (n, n) and the bias C dq + G (n,) of one sample into arrays.  (4.41)
 
     Column c of M is the effort of a unit acceleration at rest without gravity, since one recursion compiles faster.
     """
@@ -43,7 +43,7 @@ def mass_and_bias(tree: Any, gravity: float, q: Any, dq: Any, ddq: Any, M: Any, 
     for c in range(n + 1):  # the last one is the bias
         for k in range(n):
             joints[k, 0, 0], joints[k, 1, 0], joints[k, 2, 0] = cos(q[k]), sin(q[k]), q[k]
-            joints[k, 3, 0], joints[k, 4, 0] = (0.0, 1.0 if k == c else 0.0) if c < n else (dq[k], ddq[k])
+            joints[k, 3, 0], joints[k, 4, 0] = dq[k] if c == n else 0.0, 1.0 if k == c else 0.0
         recursions.inverse_dynamics(tree, gravity if c == n else 0.0, joints, work, effort, range(1))
         for k in range(c + 1 if c < n else 0):  # a distal link's effort at earlier joints has the fewest lost digits
             M[k, c] = M[c, k] = effort[k, 0]

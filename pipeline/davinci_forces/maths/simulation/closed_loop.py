@@ -7,7 +7,6 @@ commands, and a sample is recorded.  Between ticks the rigid body moves by one i
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store, compile_function
@@ -25,19 +24,17 @@ class Plant(NamedTuple):
     """The rigid body: the arm, its rotors and its tip."""
 
     tree: Tree
-    rest: Array  # zero acceleration (n,)
     rotors: Array  # eta^2 J_m (n,)
     body: int  # body to which the tip is fixed
     tip: tuple[float, float, float]  # in that body's frame [m]
 
 
 class JointConstraints(NamedTuple):
-    """Friction, end stops and locks of n joints."""
+    """Friction and end stops of n joints."""
 
     friction: Friction
     lower: Array  # end stops (n,)
     upper: Array
-    moving: NDArray[np.bool_]  # (n,); the other joints stay at rest
 
 
 class Timing(NamedTuple):
@@ -64,13 +61,13 @@ def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
     frame = chain.names.index(chain.tip)
     x, y, z = chain.offset[frame, :3, 3].tolist()
     tree = tree_of(chain, parameters)
-    return Plant(tree, np.zeros(n), rotors.astype(np.float64), int(chain.body[frame]), (x, y, z))
+    return Plant(tree, rotors.astype(np.float64), int(chain.body[frame]), (x, y, z))
 
 
 @compile_function
 def dynamics(plant: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
     """Fill M (n, n), rotors included, and b (n,) = C dq + G.  (A.12)"""
-    mass_and_bias(plant.tree, GRAVITY, q, dq, plant.rest, M, b)
+    mass_and_bias(plant.tree, GRAVITY, q, dq, M, b)
     for i in range(len(q)):
         M[i, i] += plant.rotors[i]
 
@@ -159,7 +156,7 @@ def _tick(
             out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
         for c in range(3):
             out.force[k, c] = force[c]
-    step(M, b, free, body.friction, body.lower, body.upper, state, body.moving, h)
+    step(M, b, free, body.friction, body.lower, body.upper, state, h)
     if tick == 0 and around.mass > 0:  # add the effort and force of the mass's acceleration
         for i in range(n):
             dq[i] = (state.dq[i] - start[i]) / h

@@ -41,8 +41,8 @@ def regulate(
 
     def effort(q: Array, dq: Array, integral: Array) -> Array:
         """The controller's effort (n,); M and b are filled with the arm's inertia and bias.  (5.17)"""
-        mass_and_bias(model.tree, GRAVITY, q, rest, rest, M, G)  # G is the gravity that the compensation assumes
-        mass_and_bias(plant.tree, GRAVITY, q, dq, rest, M, b)
+        mass_and_bias(model.tree, GRAVITY, q, rest, M, G)  # G is the gravity that the compensation assumes
+        mass_and_bias(plant.tree, GRAVITY, q, dq, M, b)
         return law.proportional * (target - q) - law.derivative * dq + law.gravity * G + law.integral * integral
 
     def slope(_: float, state: Array) -> Array:
@@ -54,7 +54,7 @@ def regulate(
     def jacobian(_: float, state: Array) -> Array:
         """d slope / d state (3 n, 3 n) without the small change of M and b; differences would be rounding at rest."""
         q, dq = np.ascontiguousarray(state).reshape(3, n)[:2]
-        mass_and_bias(plant.tree, GRAVITY, q, dq, rest, M, b)
+        mass_and_bias(plant.tree, GRAVITY, q, dq, M, b)
         gains = (-law.proportional, -law.derivative - viscous, law.integral)
         accelerations = np.linalg.solve(M + inertia, np.hstack([np.diag(gain) for gain in gains]))
         zero, one = np.zeros((n, n)), np.eye(n)

@@ -94,21 +94,19 @@ def middle(state: Any, h: float, q: Any, dq: Any) -> None:
 
 
 @compile_function
-def step(
-    M: Any, b: Any, tau: Any, friction: Friction, lower: Any, upper: Any, state: State, moving: Any, h: float
-) -> None:
+def step(M: Any, b: Any, tau: Any, friction: Friction, lower: Any, upper: Any, state: State, h: float) -> None:
     """Advance the state by h [s] under constant efforts.
 
     `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step; `tau` (n,) is the effort minus the external
-    effort.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is set to this
-    stop with zero velocity, as in Simulink's second-order integrator (section 4.5).
+    effort.  A joint that would pass `lower` or `upper` is set to this stop with zero velocity, as in Simulink's
+    second-order integrator (section 4.5).
     """
     q, dq, z, before = state.q, state.dq, state.z, state.before
     n = len(q)
     A, rows = np.zeros((n, n)), np.zeros((7, n))
     r, new, up, down, decay, free, side = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
     for i in range(n):
-        r[i], new[i], decay[i], free[i] = h * (tau[i] - b[i]), dq[i], 1.0, moving[i]
+        r[i], new[i], decay[i], free[i] = h * (tau[i] - b[i]), dq[i], 1.0, 1.0
         for j in range(n):
             A[i, j] = M[i, j]
             r[i] += M[i, j] * dq[j]
@@ -125,7 +123,7 @@ def step(
     for i in range(n):
         if side[i] != 0:
             q[i] = upper[i] if side[i] > 0 else lower[i]
-        elif moving[i]:
+        else:
             q[i] += h / 2 * (dq[i] + new[i])
         z[i] = (z[i] + h * new[i]) / decay[i]
         before[i], dq[i] = dq[i], new[i]
