@@ -69,8 +69,7 @@ def _shorten(t: Array, span: slice, odd: Difference, M: int, length: float, rate
 def multiple_of_period(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
     """The number k, the first of `among`, for which signals (N,) repeat only after k of these periods, or 1.
 
-    A motion may nearly repeat within its period.  Then every k-th period agrees with the first, and the periods between
-    do not.  The groups are compared by an analysis of variance.
+    A motion may nearly repeat within its period: then only every k-th period agrees, by an analysis of variance.
     """
     phased, number = Phases(t, length, phases(length, rate)), repetitions(t, length)
     residuals = [phased.move_to_phases(x)[1] for x in signals if among]
@@ -129,67 +128,44 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
     mean square of the difference over the variance between the others.  Correlated noise reduces the degrees of
     freedom of both squares, by a factor that follows from the correlation of the other periods.
     """
-    periods = _Periods.from_times(t, length, rate)
-    if len(periods.numbers) < 3:
+    phased, number = Phases(t, length, phases(length, rate)), repetitions(t, length)
+    first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])  # sample of each of M periods that hold samples
+    M, K = len(first), phased.K
+    if M < 3:
         return []
-    return [difference for i, x in enumerate(signals) for difference in periods.odd(x, i)]
-
-
-class _Periods(NamedTuple):
-    """The places of samples (N,) in a table of M periods by K phases, which all signals of a log share."""
-
-    phased: Phases
-    numbers: Integers  # (M,) of the periods that hold samples
-    first: Integers  # (M,) first sample of each period
-    place: Integers  # (N,) of each sample in the table
-    counts: Integers  # (M, K) samples in each cell
-    totals: Integers  # (K,) samples of each phase
-    weight: Array  # (M, K) of the squared deviation of a period's sum; 0 if the period or the others have no samples
-    compared: Integers  # (M,) phases at which a period and the others have samples
-    degrees: Integers  # (M,) of freedom behind the variance of the others
-
-    @classmethod
-    def from_times(cls, t: Array, length: float, rate: float) -> "_Periods":
-        phased, number = Phases(t, length, phases(length, rate)), repetitions(t, length)
-        first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
-        M, K = len(first), phased.K
-        place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t)))
-        place += nearest(t - t[0], length, K)
-        counts = np.bincount(place, minlength=M * K).reshape(M, K)
-        totals = counts.sum(axis=0)
-        others = totals - counts
-        pairs = counts * others
-        weight = np.divide(totals, pairs, out=np.zeros(pairs.shape), where=pairs > 0)
-        degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
-        return cls(phased, number[first], first, place, counts, totals, weight, (pairs > 0).sum(axis=1), degrees)
-
-    def odd(self, x: Array, signal: int) -> list[Difference]:
-        """The differences of the periods of a signal (N,) that differ from the others."""
-        _, residual = self.phased.move_to_phases(x)
-        sums = _sums(self.place, residual, self.counts)
-        mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
-        deviation = sums - self.counts * mean
-        explained = np.einsum("mk,mk,mk->m", deviation, deviation, self.weight)
+    place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t))) + nearest(t - t[0], length, K)
+    counts = np.bincount(place, minlength=M * K).reshape(M, K)
+    totals = counts.sum(axis=0)
+    others = totals - counts
+    pairs = counts * others  # 0 if a period or the others have no samples at a phase
+    weight = np.divide(totals, pairs, out=np.zeros(pairs.shape), where=pairs > 0)
+    degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)  # behind the variance of the others
+    found = list[Difference]()
+    for signal, x in enumerate(signals):
+        _, residual = phased.move_to_phases(x)
+        sums = _sums(place, residual, counts)
+        mean = sums.sum(axis=0) / np.maximum(totals, 1)
+        deviation = sums - counts * mean
+        explained = np.einsum("mk,mk,mk->m", deviation, deviation, weight)
         # Squares between the other periods: all squares less the squares within this period and of its difference.
-        squares = np.add.reduceat(residual * residual, self.first)
-        within = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
+        squares = np.add.reduceat(residual * residual, first)
+        within = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(counts, 1))
         between = squares.sum() - mean @ sums.sum(axis=0)
-        noise = np.maximum(between - explained - within, 0.0) / self.degrees
-        difference = explained / np.maximum(self.compared, 1)
+        noise = np.maximum(between - explained - within, 0.0) / degrees
+        difference = explained / np.maximum((pairs > 0).sum(axis=1), 1)
         ratio, rms = np.sqrt(difference / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(difference - noise, 0.0))
-        return [
-            Difference(signal, int(self.numbers[m]), int(self.numbers[-1]) + 1, float(rms[m]), float(ratio[m]))
-            for m in np.flatnonzero(ratio > MIN_ODD_RATIO).tolist()
-            if rms[m] > NEGLIGIBLE_DIFFERENCE * x.std() and self._is_unlikely(m, float(ratio[m]), sums)
-        ]
+        for m in np.flatnonzero((ratio > MIN_ODD_RATIO) & (rms > NEGLIGIBLE_DIFFERENCE * x.std())).tolist():
+            rho = _lag_one_of_others(np.delete(sums, m, axis=0), np.delete(counts, m, axis=0))
+            if is_unlikely(float(ratio[m]) ** 2, rho, K, degrees[m]):
+                period, periods = int(number[first[m]]), int(number[-1]) + 1
+                found.append(Difference(signal, period, periods, float(rms[m]), float(ratio[m])))
+    return found
 
-    def _is_unlikely(self, m: int, ratio: float, sums: Array) -> bool:
-        """Whether noise correlated like that of the other periods rarely gives such a difference; `sums` (M, K)."""
-        others = np.arange(len(sums)) != m
-        counts, sums = self.counts[others], sums[others]
-        mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
-        noise = np.where(counts > 0, sums / np.maximum(counts, 1) - mean, 0.0)
-        return is_unlikely(ratio**2, _lag_one(noise), counts.shape[1], self.degrees[m])
+
+def _lag_one_of_others(sums: Array, counts: Integers) -> float:
+    """Correlation of the noise of periods from phase to phase, from sums and numbers of samples (M, K)."""
+    mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
+    return _lag_one(np.where(counts > 0, sums / np.maximum(counts, 1) - mean, 0.0))
 
 
 def stretch(t: Array, signals: Sequence[Array], length: float, agreed: slice, harmonics: int) -> tuple[slice, float]:
