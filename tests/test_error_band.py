@@ -13,7 +13,6 @@ from davinci_forces.maths.uncertainty.error_band import (
     coverage_by_speed,
     error_of_coverage,
     students_95,
-    weighted_quantile,
 )
 
 RATE, STD = 100.0, 0.05
@@ -98,7 +97,7 @@ def test_few_uncorrelated_errors_widen_the_band_and_many_do_not():
     """As in conformal prediction: with fewer than 19 uncorrelated errors, the largest one counts."""
     data = of_logs([free_motion(i) for i in range(6)])
     few, many = (calibrate(data._replace(uncorrelated=np.full(len(data.dq), n / len(data.dq)))) for n in (15, 1e6))
-    quantile = weighted_quantile(np.abs(data.error) / STD, data.weight, 0.95) / NORMAL_95
+    quantile = np.quantile(np.abs(data.error) / STD, 0.95, weights=data.weight, method="inverted_cdf") / NORMAL_95
     assert many.factor == pytest.approx(np.full(4, quantile), rel=0.1)
     assert few.factor == pytest.approx(np.full(4, np.abs(data.error).max() / STD / NORMAL_95), rel=0.2)
 

@@ -92,8 +92,12 @@ def calibrate(data: FreeErrors) -> Calibration:
     size, share = np.abs(data.error) / np.sqrt(data.std**2 + v) + TINY, min((1.0 + 1.0 / n) * TYPICAL_SHARE, 1.0)
     edges = np.quantile(np.abs(data.dq), np.arange(1, SPEED_RANGES) / SPEED_RANGES)
     inside = [speed_range(data.dq, edges) == number for number in range(SPEED_RANGES)]
-    overall = np.log(weighted_quantile(size, weight, share))
-    by_range = np.array([np.log(weighted_quantile(size[r], weight[r], share)) if r.any() else overall for r in inside])
+
+    def log_quantile(which: Booleans) -> float:
+        return float(np.log(np.quantile(size[which], share, weights=weight[which], method="inverted_cdf")))
+
+    overall = log_quantile(np.ones(len(size), np.bool_))
+    by_range = np.array([log_quantile(which) if which.any() else overall for which in inside])
     trust = np.array([data.uncorrelated[r].sum() for r in inside])
     trust /= trust + SHRINKAGE
     factor = np.exp(trust * by_range + (1.0 - trust) * overall) / NORMAL_95
@@ -102,13 +106,6 @@ def calibrate(data: FreeErrors) -> Calibration:
     logs = [np.log(np.quantile(size[data.unit == number], TYPICAL_SHARE)) for number in np.unique(data.unit)]
     spread = float(np.std(logs, ddof=1) / len(logs) ** 0.5) if len(logs) > 1 else float("nan")
     return Calibration(edges, factor, widening**2 * v, spread)
-
-
-def weighted_quantile(x: Array, weight: Array, share: float) -> float:
-    """The smallest of the values (C,) up to which lies a share of the weight (C,)."""
-    order = np.argsort(x)
-    total = np.cumsum(weight[order])
-    return float(x[order][min(int(np.searchsorted(total, share * total[-1])), len(x) - 1)])
 
 
 def students_95(degrees: int) -> float:
