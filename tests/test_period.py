@@ -96,7 +96,7 @@ def test_noise_is_no_harmonic_however_large():
     x = waves(np.arange(1000) / RATE, 10.0) + 0.3 * np.random.default_rng(2).normal(size=1000)
     amplitude = harmonics.amplitudes(x)
     assert amplitude[4:].max() > 0.03
-    assert harmonics.last_above(amplitude, 0.01) == 3
+    assert harmonics.last_above(amplitude) == 3
 
 
 STOPS = pytest.mark.parametrize("goes_on", [True, False], ids=["goes on", "has gone on"])

@@ -176,21 +176,17 @@ def largest_omitted(amplitude: Array, harmonics: int) -> tuple[int, float]:
     return order, float(amplitude[order]) / largest
 
 
-def last_above(amplitude: Array, share: float = MIN_SHARE) -> int:
-    """The order of the last harmonic above a share of the largest, and above the noise of `amplitude`; 0 if none is.
-
-    The upper half of the spectrum is noise.
-    """
-    noise = SIGNIFICANT * float(np.median(amplitude[len(amplitude) // 2 :]))
-    orders = np.flatnonzero(amplitude[1:] > max(noise, share * float(amplitude[1:].max(initial=0.0)))) + 1
+def last_above(amplitude: Array) -> int:
+    """The order of the last harmonic above `MIN_SHARE` of the largest, and above the noise of `amplitude`; else 0."""
+    noise = SIGNIFICANT * float(np.median(amplitude[len(amplitude) // 2 :]))  # the upper half of the spectrum is noise
+    orders = np.flatnonzero(amplitude[1:] > max(noise, MIN_SHARE * float(amplitude[1:].max(initial=0.0)))) + 1
     return int(orders[-1]) if len(orders) else 0
 
 
 def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:
     """Covariance (3, 3) of x, dx and ddx from white noise in K samples of a period, after the projection on harmonics.
 
-    Each harmonic keeps 2 sigma^2 / K of the noise, and the mean half as much.  A derivative leads by a quarter of a
-    period, so that only x and ddx correlate.
+    Each harmonic keeps 2 sigma^2 / K of it, and the mean half as much.  A derivative leads by a quarter of a period.
     """
     rate = omega * np.arange(1, harmonics + 1)
     variance = sigma**2 / K * (1.0 + 2.0 * harmonics)

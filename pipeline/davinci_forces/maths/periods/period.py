@@ -8,6 +8,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.periods.harmonics import Harmonics, derivative
 
+MAX_STEPS = 30  # of Gauss-Newton
 LINES_LOST = 2.0  # spectral lines by which an interval of two standard errors is widened; found by simulation
 LINES_BESIDE = 1000  # spectral lines used above the highest harmonic; 3e-4 of the slope's power is beyond them
 
@@ -19,14 +20,14 @@ class Period(NamedTuple):
     std: float
 
 
-def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, steps: int = 30) -> float:
+def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int) -> float:
     """Fit the period [s] of the signals' harmonics by Gauss-Newton with the coefficients projected out.
 
     `t` (N,) [s]; `signals` (N,) each, weighted by the inverse of its residual power; `period` [s] is close: the
     highest harmonic drifts less than half a turn over the record.  (G. Golub and V. Pereyra, variable projection, 1973)
     """
     omega, shifted = 2 * np.pi / period, t - t.mean()
-    for _ in range(steps):
+    for _ in range(MAX_STEPS):
         gradient, information = 0.0, 0.0
         for weight, slope, residual in _linearised(shifted, signals, omega, harmonics):
             gradient += weight * float(slope @ residual)
@@ -66,10 +67,7 @@ def standard_error(t: Array, signals: Sequence[Array], period: float, harmonics:
 def _linearised(
     t: Array, signals: Sequence[Array], omega: float, harmonics: int
 ) -> Iterator[tuple[float, Array, Array]]:
-    """Yield for each signal its weight, its derivative by omega orthogonal to the harmonics, and its residual.
-
-    `t` (N,) is centred; `signals`, derivatives and residuals are (N,) each.
-    """
+    """Yield each signal's weight, derivative by omega orthogonal to harmonics, and residual (N,); `t` is centred."""
     harmonic = Harmonics(t, omega, harmonics)
     for x in signals:
         c, residual = harmonic.fit(x)
