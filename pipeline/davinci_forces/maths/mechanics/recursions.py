@@ -37,13 +37,6 @@ def fill(signal: Any, value: float, samples: Samples) -> None:
         signal[s] = value
 
 
-def add_effort(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
-    """Add the effort of a joint that exerts a wrench on its link: the force along z, or the moment about z."""
-    effort = wrench[2 if slides else 5]
-    for s in samples:
-        total[s] += effort[s]
-
-
 def motions(tree: Tree, gravity: float, joints: Any, scratch: Any, samples: Samples) -> None:
     """Store the motion (w, dw, a) of every link in the first 9 numbers of its body."""
     for k in range(3):
@@ -77,7 +70,9 @@ def inverse_dynamics(tree: Tree, gravity: float, joints: Any, scratch: Any, tau:
     for i in range(len(tree.parent) - 1, -1, -1):
         constants, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
         parent, body = scratch[tree.parent[i]], scratch[i + 1]
-        add_effort(tau[tree.coordinate[i]], body[9:], slides, samples)
+        total, effort = tau[tree.coordinate[i]], body[11 if slides else 14]  # the force along z, or the moment about z
+        for s in samples:
+            total[s] += effort[s]
         for s in samples:
             wrench = vector(body, 9, s), vector(body, 12, s)
             f, n = link.wrench_in_parent_frame(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
