@@ -11,10 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import PARAMETERS, as_bodies
+from davinci_forces.maths.mechanics.bodies import as_bodies
 from davinci_forces.maths.mechanics.chain import FIXED, ChainFrame, chain_of
 from davinci_forces.maths.mechanics.placed import placed_frame
 from davinci_forces.maths.mechanics.rigid_body import loaded_by_gravity
@@ -69,7 +67,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
         return None
     frames = _frames(root, ordered, moved, list(coordinates), weights)
     chain, parameters = chain_of(root, frames, _tip(root, ordered))
-    known_bodies = as_bodies(parameters) if any(weight is not None for weight in weights.values()) else None
+    known_bodies = as_bodies(parameters) if any(link.child("inertial") for link in links.values()) else None
     name = outermost.attributes.get("name", "") or stem
     robot_joints = tuple(
         _joint(by_name[joint], called, moves)
@@ -149,19 +147,18 @@ def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]
 
 
 def _frames(
-    root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Mover], coordinates: list[str],
-    weights: dict[str, Array | None],
-) -> list[ChainFrame]:  # fmt: skip
+    root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Mover], coordinates: list[str], weights: dict[str, Array]
+) -> list[ChainFrame]:
     indices = {name: i for i, name in enumerate([root, *(joint.child for joint in ordered)])}
     frames = list[ChainFrame]()
     for joint in ordered:
-        by, weight = moved[joint.name], weights[joint.child]
-        parameters = np.zeros(len(PARAMETERS)) if weight is None else weight
-        coordinate, before = coordinates.index(by.by) if by.by else FIXED, indices[joint.parent]
-        slides, pose = joint.kind == "prismatic", joint.placement
-        frames.append(
-            placed_frame(joint.child, before, pose, joint.axis, coordinate, by.sign, by.bias, slides, parameters)
+        by, place, weight = (
+            moved[joint.name],
+            (indices[joint.parent], joint.placement, joint.axis),
+            weights[joint.child],
         )
+        coordinate, slides = coordinates.index(by.by) if by.by else FIXED, joint.kind == "prismatic"
+        frames.append(placed_frame(joint.child, *place, coordinate, by.sign, by.bias, slides, weight))
     return frames
 
 

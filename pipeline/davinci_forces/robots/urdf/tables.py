@@ -18,7 +18,7 @@ import numpy as np
 from davinci_forces.errors import BadRobot
 from davinci_forces.files import read_bytes
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias, tensors
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, of_pseudo_inertias, pseudo_inertias, tensors
 from davinci_forces.maths.mechanics.placed import transform
 from davinci_forces.robots.robot import MOST_LINKS
 from davinci_forces.toml import TomlFile, excerpt, unlikely
@@ -56,10 +56,7 @@ class Element:
 
 
 def read(file: Path) -> Element:
-    """Read the outermost element of a file.
-
-    Raises BadRobot if the file cannot be read, is not XML, or has a document type.
-    """
+    """The outermost element of a file; raises BadRobot if it cannot be read, is not XML, or has a document type."""
     try:
         text = read_bytes(file, MAX_BYTES, TOO_LARGE)
     except FileNotFoundError:
@@ -184,11 +181,11 @@ class Notes:
         return transform(xyz, rpy)
 
 
-def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
-    """The inertial parameters (10,) of a link in its frame; None if it has no <inertial>."""
+def inertial_parameters(link: Element, file: TomlFile) -> Array:
+    """The inertial parameters (10,) of a link in its frame; 0 if it has no <inertial>."""
     stated = link.child("inertial")
     if stated is None:
-        return None
+        return np.zeros(len(PARAMETERS))
     notes, mass = Notes(file, link), stated.child("mass")
     m = notes.number(mass, "value", 0.0)
     if mass is None or "value" not in mass.attributes:
