@@ -71,8 +71,7 @@ class Agreement(NamedTuple):
 def fit_mass(rows: Sequence[Rows]) -> MassEstimate:
     """Estimate the mass from all joints, with its standard error by the jackknife over sixths of the path.
 
-    The residuals of a model repeat with the path: its sixths are nearly independent, but samples and periods are not.
-    (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 11)
+    The residuals of a model repeat with the path: only its sixths are nearly independent.  Efron and Tibshirani, 1993
     """
     without = np.array([[_mass(rows, block)] for block in range(PARTS)])
     return MassEstimate(_mass(rows), float(of_left_out(without)[0]))
@@ -213,21 +212,14 @@ def unit_load(chain: Chain, link: str, position: ArrayLike, q: Array, dq: Array,
 
     The effort consists of gravity and inertia.  A mass m adds m times this effort to that of the motion.
     """
-    n, L = q.shape[1], len(chain.links)
+    n, L, which, frame = q.shape[1], len(chain.links), chain.links.index(link), chain.names.index(link)
+    pose = frames(chain, np.zeros(n))[frame] @ np.linalg.inv(chain.offset[frame])
+    point = np.append(remote_centre(chain) + np.asarray(position, float), 1.0)
     masses, centres = np.zeros(L), np.zeros((L, 3))
-    which = chain.links.index(link)
-    masses[which], centres[which] = 1.0, in_link(chain, link, position, n)
+    masses[which], centres[which] = 1.0, np.linalg.solve(pose, point)[:3]  # in the link's frame, whatever q
     return inverse_dynamics(chain, Bodies(masses, centres, np.zeros((L, 3, 3)), np.zeros(L, np.int64)), q, dq, ddq)
 
 
 def tip_position(chain: Chain, n: int) -> Array:
     """The tip's position (3,) [m] from the remote centre, in base axes, with the first n coordinates at 0."""
     return np.asarray(tip(chain, np.zeros(n)) - remote_centre(chain))
-
-
-def in_link(chain: Chain, link: str, position: ArrayLike, n: int) -> Array:
-    """Convert a position (3,) into the link's own frame [m], in which it does not depend on q."""
-    frame = chain.names.index(link)
-    pose = frames(chain, np.zeros(n))[frame] @ np.linalg.inv(chain.offset[frame])
-    point = np.append(remote_centre(chain) + np.asarray(position, float), 1.0)
-    return np.asarray(np.linalg.solve(pose, point)[:3])

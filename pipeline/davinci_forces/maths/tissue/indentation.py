@@ -43,11 +43,6 @@ class Hinge(NamedTuple):
     reach: float  # depth of the deepest sample below the onset
     before: int  # number of fitted samples before the onset depth
 
-    @property
-    def rise(self) -> float:
-        """Change of the force from first contact to the deepest sample."""
-        return float(self.slope * self.reach**self.exponent)
-
 
 def hinge(depth: Array, force: Array) -> Hinge:
     """Fit a hinge to forces (N,) at depths (N,), N >= 4, and choose its exponent."""
@@ -119,8 +114,7 @@ def all_of(depth: Array, counted: Booleans, state: str = ALL_CONTACT) -> Indenta
 def find_contact(depth: Array, force: Array, counted: Booleans) -> Indentation:
     """Find the contact of one push, in order of time: forces (N,) [N] at depths (N,) [m] that grow into the tissue.
 
-    `counted` (N,) are the samples at which the force is known.  Loading and unloading have an onset each, since tissue
-    recovers more slowly than it yields.
+    The force is known at `counted` (N,) samples.  Tissue recovers slowly: loading and unloading have an onset each.
     """
     loading = is_loading(depth)
     into, out = loading & counted, ~loading & counted
@@ -147,8 +141,8 @@ def stands_out(bend: Hinge, depth: Array) -> bool:
     """Whether the force changes with depth (N,) by more than its scatter."""
     if len(depth) <= MIN_SAMPLES_ONSET:
         return False
-    noise = np.sqrt(bend.squares / (len(depth) - MIN_SAMPLES_ONSET))
-    return bool(abs(bend.rise) > MIN_RISE_DEVIATIONS * noise)
+    noise, rise = np.sqrt(bend.squares / (len(depth) - MIN_SAMPLES_ONSET)), bend.slope * bend.reach**bend.exponent
+    return bool(abs(rise) > MIN_RISE_DEVIATIONS * noise)
 
 
 def bends(bend: Hinge) -> bool:

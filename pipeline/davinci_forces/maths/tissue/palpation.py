@@ -31,8 +31,7 @@ MAX_NAMED = 5  # largest number of pushes that a remark names
 def between_troughs(x: Array) -> list[slice]:
     """Split a signal (N,) into swings, each from the lowest sample before a peak to the lowest after it.
 
-    The prominence of a peak is at least a share of the signal's range, without the extreme 1 % of its samples.  A peak
-    at an end of the signal counts.
+    A peak's prominence is a share of the range without the extreme 1 % of samples; a peak at an end counts.
     """
     from scipy.signal import find_peaks
 
@@ -86,8 +85,7 @@ def known_samples(probing: Probing) -> Probing:
 def moves(speed: Array, usual: float, reach: int) -> Booleans:
     """Whether the force is known at each sample (N,): at rest, friction hides any effort up to its Coulomb level.
 
-    A joint is at rest below a tenth of its `usual` speed, and for `reach` samples before and after, over which a
-    low-pass spreads the standstill.
+    A joint is at rest below a tenth of its `usual` speed, and `reach` samples around, over which a low-pass spreads it.
     """
     from scipy.ndimage import maximum_filter1d
 

@@ -9,8 +9,7 @@
 x is the depth below first contact and v its rate.  Each push has its own offset c.  For a given exponent n all models
 are linear: a push contributes small matrices of products, which are subtracted from the sums to leave the push out.
 
-Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, Journal of Applied Mechanics 42
-(1975).
+Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Applied Mechanics 42 (1975).
 """
 
 from collections.abc import Sequence
@@ -36,11 +35,6 @@ class ForceLaw(NamedTuple):
     def parameters(self) -> int:
         """Number of parameters that all pushes share."""
         return len(self.columns) + self.free
-
-    @property
-    def has_damping(self) -> bool:
-        """Whether the force depends on velocity."""
-        return len(self.columns) > 1
 
 
 LAWS = (

@@ -72,14 +72,14 @@ class ExcitationTrajectory:
 
     def facts(self) -> dict[str, Any]:
         """All properties, in JSON's types."""
-        x, names = self.series.x.tolist(), coefficient_names(len(self.series.a))
+        names = ("a0", *(f"{letter}{k}" for k in range(1, len(self.series.a) + 1) for letter in "ab"))
         symbols = ("q", "dq", "ddq")
         return {
             "joint": self.joint.name,
             "criterion": self.problem.criterion,
             "objective": finite(self.objective),
             "condition": finite(self.condition),
-            "coefficients": dict(zip(names, x, strict=True)),
+            "coefficients": dict(zip(names, self.series.x.tolist(), strict=True)),
             "period": self.series.period,
             "samples": self.problem.samples,
             "ranges": {s: list(r) for s, r in zip(symbols, fourier.ranges(self.series), strict=True)},
@@ -109,11 +109,6 @@ def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
 def finite(value: float) -> float | None:
     """The number, or None for JSON's null if it is infinite because the trajectory does not separate the terms."""
     return value if math.isfinite(value) else None
-
-
-def coefficient_names(harmonics: int) -> list[str]:
-    """The names of a series' coefficients: a0, a1, b1, a2, b2, ..."""
-    return ["a0", *(f"{letter}{k}" for k in range(1, harmonics + 1) for letter in "ab")]
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:

@@ -141,7 +141,7 @@ def choose_law(
         return [], None, ""
     inside = [push.contact.inside for push in long]
     sums = tissue.moments([(p.depth_in_contact[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
-    models = [tissue.cross_validate_law(sums, law) for law in tissue.LAWS if clocked or not law.has_damping]
+    models = [tissue.cross_validate_law(sums, law) for law in tissue.LAWS if clocked or law.columns == (0,)]
     return models, *tissue.preferred_law(models)
 
 
