@@ -1,8 +1,7 @@
 """Compile loops that numpy cannot express.  No fastmath: a result must not depend on the compiler's optimisations.
 
 Numba recompiles a function when its own file changes, but not when a function that it inlines does.  The folder of
-compiled code is therefore named by a hash of all sources.  To load compiled code is to run it, so only the user may
-write there.
+compiled code is named by a hash of all sources.  To load compiled code is to run it: only the user may write there.
 """
 
 import atexit

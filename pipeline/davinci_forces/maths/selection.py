@@ -57,10 +57,7 @@ class Equations(NamedTuple):
 
 
 def sum_equations(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
-    """Sum the equations of Phi (N, m, p) and tau (N, m) by the cell of each sample (N,); cell -1 is left out.
-
-    Efforts that are NaN are left out.
-    """
+    """Sum the equations of Phi (N, m, p) and tau (N, m) by cell (N,); cell -1 and efforts that are NaN are left out."""
     m, p = Phi.shape[1:]
     equations = Equations(np.zeros((cells, m, p, p)), np.zeros((cells, m, p)), np.zeros((cells, m)))
     for c in np.unique(cell[cell >= 0]).tolist():
@@ -96,10 +93,7 @@ class Ridge(NamedTuple):
 
 
 def solve(equations: Equations, ridge: Ridge) -> Array:
-    """Solve the equations of one cell for the parameters (p,).
-
-    Raises LinAlgError if the columns are linearly dependent and there is no ridge.
-    """
+    """Solve one cell for its parameters (p,); raises LinAlgError if columns are linearly dependent without a ridge."""
     return np.asarray(solve_each(equations, ridge)[0])
 
 
@@ -228,10 +222,7 @@ class LeftOut:
         self.schemes = [(equations.sum_groups(~groups), scored.sum_groups(groups)) for groups in schemes]
 
     def cross_validate(self, ridge: Ridge) -> CrossValidation:
-        """Cross-validate a candidate: leave out each group of cells in turn, and predict it.
-
-        Raises LinAlgError if the columns of the other cells are linearly dependent.
-        """
+        """Leave out each group of cells in turn, and predict it; raises as `solve` does for the other cells."""
         unseen, fitted, of_all = [], [], solve(self.all, ridge)
         for training, groups in self.schemes:
             unseen.append(groups.errors(solve_each(training, ridge)) / self.squares)

@@ -77,10 +77,7 @@ AXIS_INDEX = {"x": X, "y": Y, "z": Z}
 
 
 def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The links as uniform cylinders in the frames of Table 3.1, as Tables 4.1 and 4.2 state them.
-
-    The centre of the instrument holder is `lc5` [m] from the origin of its frame.
-    """
+    """The links as cylinders in the frames of Table 3.1; the holder's centre is `lc5` [m] from its frame's origin."""
     centres = np.zeros((len(CYLINDERS), 3))
     for centre, (*_, axis, distance) in zip(centres, CYLINDERS, strict=True):
         centre[axis] = distance

@@ -5,8 +5,7 @@ axis.  The remote centre is on the yaw axis, at (0, L2, 0); at q = 0 the tool pa
 parallel to the yaw axis and carry the end link, which turns about the remote centre without a bearing there.  Masses
 are not published.
 
-Wang, Gondokaryono, Munawar and Fischer, A convex optimization-based dynamic model identification package for the da
-Vinci Research Kit, 2019.
+Wang et al., A convex optimization-based dynamic model identification package for the da Vinci Research Kit, 2019.
 """
 
 from dataclasses import replace

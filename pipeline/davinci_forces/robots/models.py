@@ -85,10 +85,7 @@ def independent(joint: Joint, added: Sequence[Term] = (), name: str = "independe
 def coupled_arm(
     robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], name: str = "coupled", group: str = ARM
 ) -> CoupledArm:
-    """Model coupled joints (indices `rows`), each with viscous, Coulomb and added friction.
-
-    Raises BadRobot if the robot has no chain.
-    """
+    """Model coupled joints `rows`, each with viscous, Coulomb and added friction; raises BadRobot without a chain."""
     names, joints = tuple(joint.name for joint in robot.joints), [robot.joints[row] for row in rows]
     friction = tuple((viscous, coulomb, *terms) for terms in added)
     keys = ("inertia", "effort", "position", "gain")

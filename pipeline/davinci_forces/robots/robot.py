@@ -152,10 +152,7 @@ class Robot:
     file: str = field(default="", compare=False)  # file that describes the robot, or ""
 
     def with_tool(self, length: float) -> "Robot":
-        """The robot with a tool whose shaft has this length [m].
-
-        Raises BadRobot if the tool's part of the chain is unknown.
-        """
+        """The robot with a tool whose shaft has this length [m]; raises BadRobot if its present tool is unknown."""
         if self.tool is None or self.chain is None:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
         chain = self.chain.lengthen(self.tool.link, length - self.tool.length)
@@ -231,10 +228,7 @@ class Robot:
         return (*(joint.name for joint in self.joints), *self.wrist)
 
     def joint(self, name: str) -> Joint:
-        """The joint with this name.
-
-        Raises BadRobot if there is no such joint; the message lists the names.
-        """
+        """The joint with this name; raises BadRobot, with the names of all joints, if there is none."""
         for joint in self.joints:
             if joint.name == name:
                 return joint

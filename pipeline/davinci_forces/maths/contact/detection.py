@@ -205,10 +205,7 @@ def without_rounding(std: Array, rounding: Array) -> Array:
 
 
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
-    """Root mean square of means over `length` samples in free space.
-
-    If no run of free samples is that long, means are over the longest run; NaN without free samples.
-    """
+    """Root mean square of means over `length` free samples, or over the longest run; NaN without free samples."""
     sums = ((np.cumsum(np.concatenate([[0.0], run])), length) for run, length in _runs(tau_ext, free, length))
     return _size([(total[length:] - total[:-length]) / length for total, length in sums])
 

@@ -42,10 +42,7 @@ class ForceErrors(NamedTuple):
 
 
 def interpolate_sensor(t: Array, clock: Array, f: Array, reach: float) -> Array:
-    """Interpolate a sensor (M, k) on its clock (M,) linearly at times (N,); NaN outside and in gaps.
-
-    An interval of more than `reach` [s] between samples is a gap.
-    """
+    """Interpolate a sensor (M, k) on its clock (M,) at times (N,); NaN outside, and in gaps over `reach` [s]."""
     following = np.clip(np.searchsorted(clock, t), 1, len(clock) - 1)
     gap = (clock[following] - clock[following - 1] > reach) & (t != clock[following])
     outside = (t < clock[0]) | (t > clock[-1])

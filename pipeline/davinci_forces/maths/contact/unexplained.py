@@ -38,10 +38,7 @@ def smoothed_course(q: Array, dq: Array, tau: Array, step: float) -> Course:
 
 
 def _regressor(course: Course, speed: float) -> Array:
-    """Offset, gravity of a turn and as a parabola, viscous and Coulomb friction, inertia: (N, 8).
-
-    The parabola serves angles of a motor, whose gear is not known.
-    """
+    """Offset, gravity of a turn, and as a parabola for a motor of unknown gear, friction and inertia: (N, 8)."""
     q, dq, ddq, _ = course
     coulomb = np.tanh(dq / max(REVERSAL * speed, 1e-12))
     return np.column_stack([np.ones_like(q), np.sin(q), np.cos(q), q, q * q, dq, coulomb, ddq])

@@ -66,11 +66,9 @@ class Cones(NamedTuple):
 
 
 def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
-    """Find the best physically possible parameters.
+    """Find the best physically possible parameters; raises NotIdentifiable if the solver does not converge.
 
     For a mechanism without bodies, the parameters of least squares are returned if their signs are possible.
-
-    Raises NotIdentifiable if the solver does not converge.
     """
     if not mechanism.links and (R.theta[mechanism.positive] >= 0).all():
         return ConsistentParameters(R.theta, R.theta, 0.0)
@@ -126,10 +124,7 @@ def scales_of_entries(size: Array, least: float) -> Array:
 
 
 def solve(F: csc_array, y: Array, cones: Cones) -> Array:
-    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges.
-
-    Raises NotIdentifiable if the solver converges at no price.
-    """
+    """Minimise |F z - y|^2 in the cones at the lowest price that converges; raises NotIdentifiable if none does."""
     for price in PRICES:
         z, gap, status = solve_at_price(F, y, cones, price)
         if gap <= MAX_GAP_SOLVER:

@@ -10,8 +10,7 @@ diagonal in frequency,
 
 so a candidate of T and a costs a product of small matrices.  Its weight is its restricted likelihood, which allows for
 the p fitted columns, which bias the correlation of the residuals.  (Patterson and Thompson, 1971; Harville, 1974.)
-The covariance is the mean over candidates: a single correlation gives too little coverage where a period has only a
-dozen correlation times.
+The covariance is the mean over candidates: one alone gives too little coverage for a dozen correlation times a period.
 """
 
 from itertools import pairwise

@@ -85,8 +85,7 @@ def fly(
 ) -> None:  # fmt: skip
     """Move particles x (S, n + 1) by velocities v (S, n), I times, with random r (I, S, n, 2) and weights w (I,).
 
-    `best` (S, n + 1) and `costs` (S,) are the best place and cost of each particle; the least cost after each move goes
-    to `history` (I,).
+    `best` (S, n + 1) and `costs` (S,) are those of each particle; `history` (I,) gets the least cost after each move.
     """
     S, n = v.shape
     monomials, leader, first = np.empty(len(factors)), np.empty(n), least(costs)

@@ -103,8 +103,7 @@ def shrink_to_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
 def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
     """Scale z to coefficients x (S, 1 + 2 N_f) of series that keep the limits, except for about 1e-7 of them.
 
-    Harmonics c of size n, with n = 1 at the first limit, become 2 c / (1 + n^2).  This has size 1 for n = 1, where its
-    slope is zero, and is smaller for any other n.
+    Harmonics c of size n, with n = 1 at the first limit, become 2 c / (1 + n^2): the size is largest, 1, for n = 1.
     """
     low, high = limits[0]
     lowest, highest = extremes(z[:, 1:], period)
@@ -144,8 +143,7 @@ def delay(z: Array, phase: Array) -> Array:
 def extremes(c: Array, period: float) -> tuple[Array, Array]:
     """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) with a mean of 0.
 
-    A parabola through each extreme of a grid and its neighbours gives its time.  The error of the time is of second
-    order in the grid's step, that of the value of fourth order.
+    A parabola through each extreme of a grid and its neighbours gives its time; the value's error is of fourth order.
     """
     harmonics = c.shape[1] // 2
     grid = c @ _grid(period, harmonics)

@@ -30,10 +30,7 @@ def best_of_starts(
     run: Callable[[np.random.Generator], tuple[Result, float]], starts: int, seed: int,
     report_start: ReportStart | None = None,
 ) -> tuple[Result, Array]:  # fmt: skip
-    """Search from several starts: the best result, and the optimum of each start (starts,).
-
-    The first starts are the same for any number of starts.
-    """
+    """Search from starts, the first the same for any number: the best result, and the optimum of each (starts,)."""
     np.empty(RETAINED)
     results = []
     for start in range(starts):

@@ -58,10 +58,7 @@ class Chain:
     up: tuple[float, float, float] = Z_AXIS  # direction against gravity, of length 1, in base axes
 
     def with_coordinates(self, n: int) -> "Chain":
-        """The same arm with only its first n coordinates; all later ones are fixed at 0.
-
-        Raises ValueError if the chain has fewer than n coordinates.
-        """
+        """The same arm with its first n coordinates, all later ones fixed at 0; raises ValueError if it has fewer."""
         if n == self.n:
             return self
         if not 0 < n < self.n:

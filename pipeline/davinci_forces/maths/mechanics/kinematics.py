@@ -50,8 +50,7 @@ def jacobian(
 ) -> tuple[Array, Array]:
     """J_v and J_omega (..., 3, n) of a point fixed to a frame; the default point is the tip.
 
-    `point` (3,) [m] is in the axes of the frame.  Velocities are in the base axes.
-    (7.21)-(7.24), with 6w7 for the second 5w6 of (4.20)
+    `point` (3,) [m] is in the frame's axes, velocities in base axes.  (7.21)-(7.24), 6w7 for the second 5w6 of (4.20)
     """
     q = np.asarray(q, float)
     index = chain.names.index(frame or chain.tip)

@@ -31,10 +31,7 @@ def placed_frame(
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
-    """The pose (4, 4) with this position [m] and this roll, pitch and yaw [rad] about fixed axes.
-
-    R = Rz(yaw) Ry(pitch) Rx(roll)
-    """
+    """The pose (4, 4) at a position [m], turned by R = Rz(yaw) Ry(pitch) Rx(roll) [rad] about fixed axes."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     T = np.eye(4)
     T[:3, 3] = xyz

@@ -43,8 +43,7 @@ def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:
 def singular_slides(chain: Chain, q_pitch: float) -> Array:
     """Slides at which J_v of the first three joints is singular at this pitch, ascending (0, 1 or 2,) [m].
 
-    det J_v is a quadratic polynomial in q3 and does not depend on the roll.  The levers of the roll about its axis and
-    of the pitch about the remote centre are each linear in q3.
+    det J_v is quadratic in q3, since the levers of roll and pitch are linear in it, and does not depend on the roll.
     """
     q = np.array([[0.0, q_pitch, slide] for slide in (-1.0, 0.0, 1.0)])
     low, middle, high = np.linalg.det(jacobian(chain, q)[0])
@@ -76,10 +75,7 @@ def covariance(std: ArrayLike, correlation: ArrayLike) -> Array:
 
 
 def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
-    """Half-axes (..., 3) of the 1-sigma ellipsoid of a covariance (..., 3, 3), the longest first.
-
-    Their directions (..., 3, 3) are in rows.
-    """
+    """Half-axes (..., 3) of the 1-sigma ellipsoid of C (..., 3, 3), the longest first, and directions in rows."""
     values, vectors = np.linalg.eigh(np.asarray(C, float))
     sigma = np.sqrt(np.maximum(values[..., ::-1], 0.0))
     directions = np.swapaxes(vectors[..., ::-1], -1, -2)

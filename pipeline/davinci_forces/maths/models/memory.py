@@ -19,10 +19,7 @@ PIECE_SAMPLES = 1 << 15  # samples of a piece
 
 
 def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Booleans]:
-    """State z (N,) of a term of one joint, and at which samples it is known (N,).
-
-    z is a deflection, a smooth sign, Stribeck's peak or a function of the motion; a term without z has the state 0.
-    """
+    """State z (N,) of a term of one joint, 0 for a term without, and at which samples it is known (N,)."""
     q, dq = motion.q[:, joint], motion.dq[:, joint]
     if term.displacement:
         return motion.memory.get((joint, term.displacement)) or deflection(motion, joint, term.displacement)
@@ -37,8 +34,7 @@ def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Bo
 def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Booleans]:
     """Deflection z (N,) of one joint, and at which samples it is known (N,); `x_0` is in the joint's units.
 
-    The deflection is 0 after each gap, and it is known after a travel of `RUN_IN` displacements.  A period is computed
-    twice: the second time starts with the last deflection of the first.
+    It is 0 after each gap, and known after a travel of `RUN_IN` displacements.  A period begins with its last one.
     """
     from davinci_forces.maths.models import kernels
 

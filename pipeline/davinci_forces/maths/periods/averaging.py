@@ -43,8 +43,7 @@ def end(t: Array, span: slice, period: float, rate: float, M: int | None = None)
 class Phases:
     """The K phases of a period, and the places of samples at times (N,) among them, which all signals of a log share.
 
-    A sample rarely falls on a phase exactly.  A smooth harmonic fit moves it to the phase: only the residual of the fit
-    is compared and averaged.
+    A sample rarely falls on a phase.  A smooth harmonic fit moves it there: only its residual is compared and averaged.
     """
 
     def __init__(self, t: Array, period: float, K: int) -> None:
@@ -80,11 +79,10 @@ class Phases:
         return of_phases.evaluate(c), residual
 
     def fold(self, x: Array) -> Folded:
-        """Average the samples (N,) at each phase, from the first sample on.
+        """Average the samples (N,) at each phase, from the first sample on.  (6.30), (6.31)
 
         For a period of a whole number of samples this is plain averaging.  White noise stays white, and a jump of
-        friction does not ring as it would under interpolation.  A phase without samples gets the fit and a count of 0.
-        (6.30), (6.31)
+        friction does not ring as under interpolation.  A phase without samples gets the fit and a count of 0.
         """
         if self.on_them:
             return average_rows(x, self.K)

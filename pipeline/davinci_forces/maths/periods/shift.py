@@ -65,8 +65,7 @@ def _apart(q: Array, reference: Array, spread: Array) -> Array:
 def likeness(t: Array, q: Array, period: Array, length: float) -> float:
     """Largest correlation between a position (N,) and a repeated period (K,) of `length` [s] over all phases.
 
-    The value is 1 for the same path, from any start in the period; `t` (N,) [s].  A recording of a period or more is
-    compared by its whole periods.
+    It is 1 for the same path, from any start; `t` (N,) [s].  Of a period or more, whole periods are compared.
     """
     K, whole = len(period), int((t[-1] - t[0]) / length + 1e-9)
     if whole:

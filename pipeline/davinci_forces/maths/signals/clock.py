@@ -87,10 +87,7 @@ class ClockStatistics:
 
 
 def interruptions(t: Array) -> tuple[int, float]:
-    """Count the steps of times (N,) that go back or are gaps, and add them up [s]: what is not the sampling time.
-
-    A gap is longer than `GAP` times the median step.
-    """
+    """Count the steps of times (N,) that go back or exceed `GAP` times the median step, and add them up [s]."""
     steps = np.diff(t)
     forward = steps[steps > 0]
     unusual = steps[(steps < 0) | (steps > GAP * np.median(forward))] if len(forward) else steps
@@ -101,9 +98,8 @@ def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tup
     """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,).
 
     Returns the values, a mask of the times `within` [s] of a sample, and one of the times between two samples at most
-    `gap` [s] apart.  Between two samples the values follow the cubic through both.  Its slope at a sample is that of
-    the parabola through the sample and its neighbours.  Values at all other times have no meaning.  (Catmull and Rom
-    1974)
+    `gap` [s] apart.  There the values follow the cubic through both, with slopes of the parabolas through a sample and
+    its neighbours.  Values at all other times have no meaning.  (Catmull and Rom 1974)
     """
     before: Integers = np.searchsorted(t, at, side="right") - 1
     if not len(t):
@@ -138,10 +134,7 @@ def longest_bridge(T_s: float) -> float:
 
 
 def are_gaps(t: Array, T_s: float) -> Booleans:
-    """Whether each interval (N-1,) between samples at times (N,) is a gap, for a usual sampling time of `T_s` [s].
-
-    Even sampling at another rate has no gaps.
-    """
+    """Whether each interval (N-1,) of times (N,) is a gap, for a usual one of `T_s` [s]; an even stretch has none."""
     h = np.diff(t)
     even = np.zeros(len(h), np.bool_)
     for run in runs(np.abs(np.diff(h)) <= ALIKE * h[:-1]):

@@ -108,8 +108,7 @@ def _proportion(x: Array, y: Array) -> tuple[float, float]:
 def is_steady(velocity: Array) -> bool:
     """Whether a velocity (N,) stays at one level after another, as in recordings for friction.
 
-    After most moving samples it then hardly changes for a short time.  Neighbouring samples are averaged, so that noise
-    does not hide a level.
+    It hardly changes after most moving samples.  Neighbouring samples are averaged, so that noise hides no level.
     """
     N = len(velocity)
     width, lag = max(N // AVERAGED_PARTS, 1), max(N // STEADY_PARTS, 1)

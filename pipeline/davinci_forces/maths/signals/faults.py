@@ -2,8 +2,7 @@
 
 A stuck sensor repeats one value exactly, and then jumps by more than any motion does.  A saturated effort stays exactly
 at its largest value, of either sign.  A step is a change that the motion does not explain: of the effort less that of
-a model, as the controller starts or stops.  Across a step of the clock the motion continues as if one sample had
-passed.
+a model, as the controller starts or stops.  Across a step of the clock the motion goes on as after one sample.
 """
 
 from typing import NamedTuple

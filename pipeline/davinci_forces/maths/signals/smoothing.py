@@ -16,8 +16,7 @@ NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """Low-pass a signal (N,), or columns (N, ...), without delay.
 
-    At `cutoff` [Hz] each of the two passes halves the power.  A cutoff at or above 0.4 of the sampling rate leaves the
-    signal as it is.
+    At `cutoff` [Hz] each of the two passes halves the power.  A cutoff from 0.4 of the sampling rate on has no effect.
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
@@ -95,10 +94,7 @@ def delay_segments(x: Array, segment: Integers, samples: float) -> Array:
 
 
 def _delay(x: Array, samples: float) -> Array:
-    """Delay a signal (N,), or columns (N, ...), by `samples`, with a cubic spline.
-
-    Beyond its ends it goes on as x(e + s) = 2 x(e) - x(e - s).
-    """
+    """Delay columns (N, ...) by `samples` with a cubic spline; beyond the ends, x(e + s) = 2 x(e) - x(e - s)."""
     from scipy.interpolate import make_interp_spline
 
     k = np.arange(len(x), dtype=float)
@@ -118,8 +114,7 @@ def segments(segment: NDArray[Any]) -> list[slice]:
 def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:
     """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] removes.
 
-    The low-pass keeps the model's error, except for jumps at reversals, which hardly change the median.  The result
-    is 0 if the low-pass removes nothing at this sampling rate.
+    The low-pass keeps the model's error but for jumps, which hardly change the median.  0 if it removes nothing.
     """
     return white_std(residual - lowpass_segments(residual, segment, rate, cutoff), share_passed(rate, cutoff))
 

@@ -98,10 +98,7 @@ def distance_of(probability: float, ordinates: int) -> float:
 
 
 def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
-    """Ljung and Box's test, and the probability of a larger distance of the cumulative periodogram.
-
-    Both probabilities are 0 for too few or constant samples.
-    """
+    """Ljung and Box's test, and the cumulative periodogram's probability; both 0 for too few or constant samples."""
     n = sum(len(x) for x in pieces)
     if n < MIN_SAMPLES_WHITENESS or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
         return LjungBox(0.0, 0.0), 0.0

@@ -90,8 +90,7 @@ def _spread(drawn: Array, n: int) -> float:
 def model_error(slow: Array, noise: float) -> tuple[float, float]:
     """Root mean square of a low-passed residual (N,) beyond the noise in it, and its standard error.
 
-    `noise` is the standard deviation of the noise that passes the low-pass.  The standard error follows from that of
-    the mean square over blocks.
+    `noise` is the deviation of the noise that passes the low-pass.  The standard error is that of the blocks' squares.
     """
     squares = slow**2
     spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
@@ -121,10 +120,7 @@ def root(square: float, std: float) -> tuple[float, float]:
 
 
 def jackknife_std(statistic: Callable[[Booleans], Array], units: Integers) -> Array:
-    """Jackknife the standard error (p,) of a statistic (p,) of a mask of samples (N,), by their `units` (N,).
-
-    NaN for a single unit.
-    """
+    """Jackknife the standard error (p,) of a statistic of a mask of samples (N,) by their `units`; NaN for one unit."""
     numbers = np.unique(units)
     return of_left_out(np.array([statistic(units != n) for n in numbers] if len(numbers) > 1 else [[np.nan]]))
 
