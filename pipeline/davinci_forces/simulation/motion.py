@@ -67,10 +67,7 @@ def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) ->
 
 
 def _in_closed_loop(scenario: Scenario, simulated_arm: SimulatedArm, log: SimulatedLog) -> SimulatedRun:
-    """Simulate the whole arm from rest at its first reference; the lead time is simulated but not recorded.
-
-    Raises BadScenario if the motion diverges, for example because the gains are too high for the tick.
-    """
+    """Simulate the arm from rest at its first reference, its lead unrecorded; raises BadScenario if it diverges."""
     chain, joints = scenario.robot.known_chain, scenario.robot.joints
     names = [joint.name for joint in joints]
     ticks = round(1 / (scenario.rate * simulated_arm.tick))

@@ -208,10 +208,7 @@ def mirror_position(position: ArrayLike) -> Array:
 
 
 def unit_load(chain: Chain, link: str, position: ArrayLike, q: Array, dq: Array, ddq: Array) -> Array:
-    """Effort (N, n) of the first n coordinates for a mass of 1 kg at a position (3,) of a link, along a motion (N, n).
-
-    The effort consists of gravity and inertia.  A mass m adds m times this effort to that of the motion.
-    """
+    """Effort (N, n) by gravity and inertia of 1 kg at a position (3,) [m] of a link, in a motion (N, n)."""
     n, L, which, frame = q.shape[1], len(chain.links), chain.links.index(link), chain.names.index(link)
     pose = frames(chain, np.zeros(n))[frame] @ np.linalg.inv(chain.offset[frame])
     point = np.append(remote_centre(chain) + np.asarray(position, float), 1.0)

@@ -94,10 +94,7 @@ def arm_problem(
     efforts: Sequence[float] = (),
     obstacles: Obstacles = NO_OBSTACLES,
 ) -> ArmExcitationProblem:
-    """The excitation problem of these joints, with the base parameters of the arm.
-
-    Largest `efforts` (n,) of the joints count where the bodies of the links are known.
-    """
+    """The excitation problem of these joints, with the arm's base parameters; `efforts` (n,) limit known bodies."""
     n = len(joints)
     parameters = np.zeros(10 * len(chain.parent)) if bodies is None else bodies.parameters(n)
     moving, merged = fold_fixed_links(chain.with_coordinates(n), parameters.reshape(-1, 10))

@@ -119,15 +119,12 @@ def of_pseudo_inertias(J: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """The drive of each coordinate (n,): all quantities are at the joint, except the inertia of the motor.
-
-    `viscous` and `coulomb` are the friction of joint and motor together.  (A.11)
-    """
+    """The drive of each coordinate (n,): all quantities are at the joint, except the inertia of the motor."""
 
     gear_ratio: Array  # eta [-], or [rad/m] for a prismatic joint
     motor_inertia: Array  # J_m [kg m^2]
-    viscous: Array  # v [N m s/rad], or [N s/m]
-    coulomb: Array  # c [N m], or [N]
+    viscous: Array  # v [N m s/rad], or [N s/m], of joint and motor together.  (A.11)
+    coulomb: Array  # c [N m], or [N], likewise
 
     @property
     def inertia(self) -> Array:

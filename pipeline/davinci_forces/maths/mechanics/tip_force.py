@@ -54,10 +54,7 @@ def singular_slides(chain: Chain, q_pitch: float) -> Array:
 
 
 def from_efforts(J: ArrayLike, tau_ext: ArrayLike, C_tau: ArrayLike) -> tuple[Array, Array]:
-    """Compute the force or wrench w (..., k) and C_w (..., k, k) from efforts (..., k) and C_tau (..., k, k).
-
-    Both results are NaN at singular poses, where the efforts do not determine one direction.  (7.26)
-    """
+    """Force or wrench w (..., k) and C_w (..., k, k) from efforts (..., k) and C_tau; NaN at singular poses.  (7.26)"""
     J, tau_ext = np.asarray(J, float), np.asarray(tau_ext, float)
     C_tau = np.broadcast_to(np.asarray(C_tau, float), J.shape)
     w, C_w = np.full(tau_ext.shape, np.nan), np.full(J.shape, np.nan)

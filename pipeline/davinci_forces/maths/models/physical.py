@@ -108,12 +108,9 @@ def reduced_parameters(
     return {term.name: float(value) for term, value in values.items()}
 
 
-@cache
+@cache  # every task needs it
 def physical_lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
-    """Derive from the chain how a joint's physical parameters determine those of its model.
-
-    None if the lumping has other parameters than `names`.  The result is cached because every task needs it.
-    """
+    """How physical parameters determine those of a joint's model, by the chain; None if these are not `names`."""
     unit, place = len(table.parameters), {(x.quality, x.link): i for i, x in enumerate(table.parameters)}
     monomials = list[tuple[tuple[int, int, int], dict[str, float]]]()
     for i, x in enumerate(table.parameters):

@@ -165,10 +165,7 @@ def amplitudes(x: Array) -> Array:
 
 
 def largest_omitted(amplitude: Array, harmonics: int) -> tuple[int, float]:
-    """The order of the largest of `amplitude` (mean, harmonics 1, 2, ...) that is not kept, over the largest of all.
-
-    (0, 0.0) if all are kept, or all are 0.
-    """
+    """The order of the largest of `amplitude` (mean, 1, 2, ...) that is not kept, over the largest; else (0, 0.0)."""
     omitted, largest = amplitude[harmonics + 1 :], float(amplitude[1:].max(initial=0.0))
     if not len(omitted) or not largest:
         return 0, 0.0

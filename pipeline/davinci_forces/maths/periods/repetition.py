@@ -49,10 +49,7 @@ def repetition(signals: Sequence[Array]) -> Repetition | None:
 
 
 def harmonics_of(signals: Sequence[Array], repeat: Repetition, least: int) -> int:
-    """The number of harmonics, at least `least`, that any of the signals (N,) has in a period of the repetition.
-
-    With fewer, the others would be taken for noise, and the period would be uncertain by as much.
-    """
+    """The number of harmonics, at least `least`, in a period of any of the signals (N,); fewer would leave noise."""
     one = slice(repeat.best_start, repeat.best_start + round(repeat.lag))
     highest = max((last_above(amplitudes(x[one])) for x in signals), default=0)
     return max(least, min(highest, int(repeat.lag / SAMPLES_PER_TURN)))
@@ -123,10 +120,7 @@ def _apart(x: Array, lag: int) -> float:
 
 
 def vertex(before: float, middle: float, after: float) -> tuple[float, float]:
-    """Lowest point of the parabola through three neighbours: its place relative to the middle one, and its value.
-
-    The point lies no further than the neighbours, because noise would determine a point beyond them.
-    """
+    """Lowest point of the parabola through three neighbours, not beyond: its place from the middle, and its value."""
     curvature = before - 2 * middle + after
     if not 0 < curvature < np.inf:
         return 0.0, middle

@@ -37,10 +37,7 @@ def roll(x: Array, samples: float) -> Array:
 
 
 def straight(q: Array, reference: Array) -> Shift:
-    """Shift in whole samples of a recording (N, J) against another (N', J) that minimises their difference.
-
-    Both recordings overlap by at least `MIN_OVERLAP` of the shorter one.
-    """
+    """Shift in whole samples of a recording (N, J) against another (N', J), overlapping, with the least difference."""
     spread = np.maximum(q.std(axis=0), 1e-300)
     a, b = q / spread, reference / spread
     N, M = len(a), len(b)
@@ -80,10 +77,7 @@ def likeness(t: Array, q: Array, period: Array, length: float) -> float:
 
 
 def most_different(periods: Sequence[tuple[Array, Array, float]], most: int) -> tuple[list[int], float]:
-    """Choose at most `most` periods (t (K,) [s], q (K,), length [s]) to represent all; also return the least likeness.
-
-    The first period is chosen, and then, one by one, the period that is least like all chosen ones.
-    """
+    """Choose at most `most` periods (t (K,) [s], q (K,), length [s]), each least like the others; and that likeness."""
     chosen, nearest = [0], np.full(len(periods), -1.0)
     while True:
         _, q, length = periods[chosen[-1]]

@@ -126,10 +126,7 @@ def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tup
 
 
 def longest_bridge(T_s: float) -> float:
-    """The longest interval [s] between samples that is interpolated, for a sampling time of `T_s` [s].
-
-    Up to `FILLED` may be missing; of slower clocks, one sample.
-    """
+    """The longest interval [s] that is interpolated at a sampling time `T_s` [s]: `FILLED` or a sample is missing."""
     return max(GAP * T_s, T_s + FILLED) * (1.0 + TIME_ROUNDING)
 
 
@@ -155,10 +152,7 @@ def are_missing(t: Array, at: Array, T_s: float) -> Booleans:
 
 
 def fill(t: Array, x: Array, T_s: float) -> Array:
-    """Fill the missing samples, NaN, of a signal (N,) at times (N,) that the neighbours are near enough to interpolate.
-
-    The samples of longer gaps, and before the first and after the last sample, stay NaN.
-    """
+    """Fill the missing samples, NaN, of a signal (N,) at times (N,), except in gaps and beyond its ends."""
     missing = np.isnan(x)
     values, _, inside = cubic(t[~missing], x[~missing, None], longest_bridge(T_s), t[missing])
     filled = x.copy()
@@ -167,10 +161,7 @@ def fill(t: Array, x: Array, T_s: float) -> Array:
 
 
 def is_slower(t: Array, missing: Booleans) -> bool:
-    """Whether the samples that are not missing (N,) follow in a rhythm of their own, so that none is missing.
-
-    Almost none of the times without samples is longer than the rhythm, as in a table of several topics.
-    """
+    """Whether the samples that are not missing (N,) follow in a rhythm of their own, as of one topic of several."""
     samples = np.flatnonzero(~missing)
     if len(samples) <= MIN_INTERVALS_EVEN:
         return False

@@ -31,10 +31,7 @@ def blocks(N: int, count: int = BOOTSTRAP_BLOCKS) -> list[slice]:
 
 
 def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block]) -> float:
-    """Bootstrap the standard error of a statistic of blocks, by drawing as many blocks with replacement.
-
-    A block is whatever the statistic takes: samples, or sums over them.  NaN for a single block.
-    """
+    """Bootstrap the standard error of a statistic of blocks, drawn with replacement; NaN for a single block."""
     if len(parts) < 2:
         return float("nan")
     return _spread(np.array([statistic([parts[i] for i in draw]) for draw in _draws(len(parts))]), len(parts))

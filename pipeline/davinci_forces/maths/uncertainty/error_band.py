@@ -116,12 +116,9 @@ def students_95(degrees: int) -> float:
 
 
 def count_uncorrelated(x: Array) -> float:
-    """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero.
-
-    The autocovariance is computed block by block, and as far as its first zero, because a series may be long.
-    """
+    """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero."""
     centred, N, lags, covariance = x - x.mean(), len(x), BLOCK_SAMPLES // 64, np.ones(1)
-    while covariance.min() >= 0.0 and len(covariance) < N:
+    while covariance.min() >= 0.0 and len(covariance) < N:  # block by block, because a series may be long
         lags, covariance = min(2 * lags, N), np.zeros(min(2 * lags, N))
         for start in range(0, N, lags):
             block, reached = (np.fft.rfft(centred[start : start + n], 4 * lags) for n in (lags, 2 * lags))
