@@ -56,7 +56,6 @@ CYLINDERS = (
 )
 HOLDER = CHAIN.links.index("5")
 GUESSED_LC5 = 0.2  # [m] in the initial guesses of Tables 6.4-6.6; Table 4.1 prints 0.3
-WRIST_COORDINATES = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
 # Gear ratios are from Table 6.3, friction from the initial guesses of Tables 6.4-6.6.  The thesis gives no friction of
 # the wrist, and neglects the inertia of the motors (4.29).
 DRIVES = Drives(
@@ -73,7 +72,6 @@ BOX = {
     Quality.VISCOUS: (0.0, 20.0),
     Quality.COULOMB: (0.0, 20.0),
 }
-AXIS_INDEX = {"x": X, "y": Y, "z": Z}
 
 
 def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
@@ -109,7 +107,7 @@ def part(name: str) -> Physical:
     if kind == "m":
         return Physical(name, Quality.MASS, float(GUESSED.masses[i]), *BOX[Quality.MASS], link)
     if kind == "I":
-        axis = AXIS_INDEX[letter]
+        axis = "xyz".index(letter)
         return Physical(name, Quality.MOMENT, float(GUESSED.inertias[i, axis, axis]), *BOX[Quality.MOMENT], link, axis)
     axis = int(np.abs(GUESSED.centres[i]).argmax())
     return Physical(name, Quality.CENTRE, float(-GUESSED.centres[i, axis]), *BOX[Quality.CENTRE], link, axis)
@@ -117,7 +115,7 @@ def part(name: str) -> Physical:
 
 def table(joint: int, names: str) -> PhysicalTable:
     """The physical parameters of one of the arm's three joints: those of its motor, and of links."""
-    return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *map(part, names.split())))
+    return PhysicalTable(CHAIN, joint, (*motor(joint), *map(part, names.split())))
 
 
 # (6.7) omits links 6 to 9.
@@ -179,12 +177,11 @@ POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)
 # The thesis does not state the friction of its simulation; these are the initial guesses of Tables 6.4-6.6.
 VISCOUS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 LIGHT = "gravity compensated with 0.9 of the masses"
-EXACT = "PD with gravity compensation, from"
 CONTROL = tuple(
     ControlStudy(name, title, start, target, K_P, K_D, integral, VISCOUS, known_masses, duration)
     for name, title, start, target, integral, known_masses, duration in (
-        ("pd-to-zero", f"{EXACT} the pose to zero", POSE, ZERO, ZERO, 1.0, 3.0),
-        ("pd-to-pose", f"{EXACT} zero to the pose", ZERO, POSE, ZERO, 1.0, 3.0),
+        ("pd-to-zero", "PD with gravity compensation, from the pose to zero", POSE, ZERO, ZERO, 1.0, 3.0),
+        ("pd-to-pose", "PD with gravity compensation, from zero to the pose", ZERO, POSE, ZERO, 1.0, 3.0),
         ("pd-light", f"PD, {LIGHT}", ZERO, POSE, ZERO, 0.9, 60.0),
         ("pid-light", f"PID, {LIGHT}", ZERO, POSE, K_I, 0.9, 60.0),
     )
@@ -200,6 +197,6 @@ ROBOT = Robot(
     ),
     chain=CHAIN,
     bodies=BODIES,
-    wrist=WRIST_COORDINATES,
+    wrist=("instrument_roll", "instrument_pitch", "instrument_yaw", "grip"),
     control=CONTROL,
 )

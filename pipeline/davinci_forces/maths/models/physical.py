@@ -54,7 +54,6 @@ class PhysicalTable:
 
     chain: Chain
     joint: int  # index, from 0
-    coordinates: int  # number n of coordinates of the chain
     parameters: tuple[Physical, ...]
 
 
@@ -145,4 +144,4 @@ def of_link(
     masses, centres, inertias = np.zeros(L), np.zeros((L, 3)), np.zeros((L, 3, 3))
     masses[which], centres[which, axis], inertias[which, axis, axis] = mass, centre, moment
     bodies = Bodies(masses, centres, inertias, np.zeros(L, np.int64)).in_frames(chain.of_links)
-    return reduced_parameters(chain, bodies, table.joint, table.coordinates)
+    return reduced_parameters(chain, bodies, table.joint)
