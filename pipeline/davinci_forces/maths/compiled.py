@@ -101,10 +101,7 @@ def temporary() -> Path:
 
 
 def private(place: Path, parents: bool = False) -> Path:
-    """Create the folder if needed, and check that only this user may write to it.
-
-    Raises PermissionError if the folder is a link or belongs to another user, or if others may write to it.
-    """
+    """Create the folder; raises PermissionError if it is a link, or another user owns it or may write to it."""
     place.mkdir(mode=0o700, parents=parents, exist_ok=True)
     status = place.lstat()
     is_private = os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)

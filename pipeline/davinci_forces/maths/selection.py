@@ -120,10 +120,7 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
 
 
 def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
-    """Covariance (p, p) of the parameters under independent noise of each effort, with a variance (m,).
-
-    Raises LinAlgError if rounding makes a variance negative.
-    """
+    """Covariance (p, p) by noise of variances (m,) in the efforts; raises LinAlgError if rounding makes it negative."""
     [scaled], [size] = scaled_equations(equations, ridge)
     inverse = np.linalg.inv(scaled) / size / size[:, None]
     result = np.asarray(inverse @ np.einsum("m,mpq->pq", ridge.weights**2 * variances, equations.gram[0]) @ inverse)

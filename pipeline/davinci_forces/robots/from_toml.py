@@ -131,10 +131,7 @@ def _limits(table: TomlTable) -> Limits:
 
 
 def read_chain(table: TomlTable, joints: Sequence[Joint]) -> tuple[Chain | None, Bodies | None, tuple[str, ...]]:
-    """Read the chain of a robot's file, the bodies of its links if known, and its coordinates beyond the joints.
-
-    Problems are noted.  Without [[link]] there is no chain.
-    """
+    """Read the chain, the bodies if known, and the coordinates beyond the joints, with problems noted; all optional."""
     entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
         return None, None, ()

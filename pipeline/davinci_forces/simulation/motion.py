@@ -44,10 +44,7 @@ class SimulatedRun:
 
 
 def simulate_log(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """Simulate one recording: the whole arm in closed loop, or joints that follow their trajectories exactly.
-
-    Raises as `_in_closed_loop` does.
-    """
+    """Simulate one recording, in closed loop, or exactly on its trajectories; raises as `_in_closed_loop` does."""
     if scenario.arm:
         return _in_closed_loop(scenario, scenario.arm, log)
     t = np.arange(round(log.duration * scenario.rate)) / scenario.rate

@@ -74,10 +74,7 @@ def drift(noise: SensorNoise, rate: float, samples: int, random: np.random.Gener
 
 
 def write(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
-    """Write the channels in the format of the file's suffix.
-
-    A channel whose quantity is `time` is the first column or channel; without it, the header states the sampling time.
-    """
+    """Write the channels in the format of the suffix; without `time` at first, the header states the sampling time."""
     {".tdms": tdms, ".lvm": lvm}[path.suffix](path, channels, rate, started)
 
 

@@ -75,10 +75,7 @@ def alarm_level(rms: float, largest: float, crossings: float) -> float:
 
 
 def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
-    """The alarm level of an effort (N,) at `rate` [Hz] by the median of its `free` samples (N,).
-
-    It tells nothing of the few samples at which something may have touched the arm.
-    """
+    """The alarm level of an effort (N,) at `rate` [Hz] by the median of `free` samples (N,), whatever a few are."""
     rms = SIGMA * float(np.median(np.abs(tau_ext[free])))
     return alarm_level(rms, 0.0, free_motion_statistics(tau_ext, free, rate).crossings)
 

@@ -192,10 +192,7 @@ def widening_factor(free: Sequence[MassEstimate], common: float) -> float:
 
 
 def moved_with(chain: Chain, coordinate: int) -> str:
-    """The link between base and tip that a coordinate moves; in a parallelogram, the one about the remote centre.
-
-    Raises ValueError if the coordinate moves nothing between base and tip.
-    """
+    """The link that a coordinate moves between base and tip, or about the remote centre; raises ValueError if none."""
     for body in to_base(chain, int(chain.body[chain.names.index(chain.tip)])):
         if chain.coordinate[body - 1] == coordinate:
             return chain.links[body - 1]

@@ -135,10 +135,7 @@ def solve(F: csc_array, y: Array, cones: Cones) -> Array:
 
 
 def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array, float, str]:
-    """Minimise |F z - y|^2 + price * traces in the cones; return z, the gap, and the solver's status.
-
-    The residual r = F z - y is a separate unknown, so that the solver never forms F' F.
-    """
+    """Minimise |F z - y|^2 + price * traces in the cones; return z, the gap, and the solver's status."""
     import clarabel
 
     p, n = F.shape
@@ -147,6 +144,7 @@ def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[
     cost[[TEN * link + k for link in range(cones.links) for k in DIAGONAL]] = price
     squares = diags_array(np.r_[np.zeros(n), np.full(p, 2.0)], format="csc")
     in_cones = hstack([-eye_array(n, format="csr")[bounded], csc_array((len(bounded), p))])
+    # The residual r = F z - y is a separate unknown, so that the solver never forms F' F.
     rows = vstack([hstack([F, -eye_array(p)]), in_cones], format="csc")
     kinds: list[Any] = [clarabel.ZeroConeT(p), *[clarabel.PSDTriangleConeT(4)] * cones.links]
     kinds += [clarabel.NonnegativeConeT(len(cones.positive))] if len(cones.positive) else []

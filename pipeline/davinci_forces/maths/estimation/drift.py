@@ -72,10 +72,7 @@ def control_limits(x: Array, std: Array, inside: float) -> tuple[float, Array]:
 
 
 def _mean_and_spread(x: Array, std: Array, further: Array) -> tuple[float, Array]:
-    """Weighted mean of values (n,), and standard deviation of the difference from it of values with errors `further`.
-
-    Errors are widened if the values scatter by more than theirs.
-    """
+    """Weighted mean (n,), and deviation from it of values with errors `further`, all widened as the values scatter."""
     w = std**-2
     mean = float(np.average(x, weights=w))
     birge = max(float(np.sum(w * (x - mean) ** 2)) / (len(x) - 1), 1.0)

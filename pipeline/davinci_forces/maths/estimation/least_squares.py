@@ -45,15 +45,13 @@ def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
 
 
 def solve_bounded(factor: Triangle, positive: Booleans) -> Array:
-    """Least-squares parameters (p,), of which those marked in `positive` (p,) are not negative.
-
-    The active-set method (Stark and Parker, 1995) meets an active bound exactly.
-    """
+    """Least-squares parameters (p,), of which those marked in `positive` (p,) are not negative."""
     from scipy.optimize import lsq_linear
 
     theta = factor.theta
     if (theta[positive] >= 0).all():
         return theta
+    # An active-set method, which meets an active bound exactly.  Stark and Parker, 1995
     solution = lsq_linear(factor.U, factor.y, (np.where(positive, 0.0, -np.inf), np.inf), method="bvls", tol=1e-14)
     return np.asarray(solution.x / factor.scale)
 

@@ -242,10 +242,7 @@ def _joint_limits(joint: ExcitationProblem, bases: Sequence[Array]) -> tuple[Arr
 
 
 def _columns(Y: Array, dq: Array, ddq: Array, columns: NDArray[np.int64], width: Array | None = None) -> Array:
-    """Columns (..., n, p) of the 10 L + 3 n of F: of Y (..., n, 10 L), then rotors, viscous and Coulomb friction.
-
-    A width (n,) makes the friction smooth.
-    """
+    """Columns (..., n, p) of F: of Y, then of rotors, viscous and Coulomb friction, smooth with a `width` (n,)."""
     of_links = columns[columns < Y.shape[-1]]
     F = np.zeros((*dq.shape, len(columns)))
     F[..., : len(of_links)] = Y[..., of_links]

@@ -79,16 +79,14 @@ class ArmLimits:
         return self.obstacles.depth(points).reshape(*q.shape[:-1], -1)
 
     def hold(self, q: Array, dq: Array, ddq: Array) -> bool:
-        """Whether the limits hold along a motion (K, n), also between its samples.
-
-        Between two samples an excess is above theirs by no more than its largest change from sample to sample.
-        """
+        """Whether the limits hold along a motion (K, n), also between its samples."""
         if not (self.limits_effort or self.obstacles.present):
             return True
         few = slice(None, None, STRIDE)
         if (self.excess(q[few], compiled_regressor(self.chain, q[few], dq[few], ddq[few])) > 0).any():
             return False
         excess = self.excess(q, compiled_regressor(self.chain, q, dq, ddq))
+        # Between two samples an excess is above theirs by no more than its largest change from sample to sample.
         return bool((excess.max(axis=0) + np.abs(np.diff(excess, axis=0)).max(axis=0) <= 0).all())
 
     @cached_property

@@ -74,10 +74,7 @@ class Bodies:
 
 
 def as_bodies(parameters: Array) -> Bodies:
-    """The bodies with inertial parameters (L, 10): the inverse of `Bodies.parameters`.
-
-    All bodies are part of the model for any n.  The centre of a body without mass is at the origin.
-    """
+    """The bodies with inertial parameters (L, 10), for any n: the inverse of `Bodies.parameters`."""
     masses = parameters[:, 0]
     centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
     weightless = Bodies(masses, centres, np.zeros((len(masses), 3, 3)), np.zeros(len(masses), np.int64))

@@ -66,10 +66,7 @@ class Chain:
         return replace(self, n=n, coordinate=np.where(self.coordinate < n, self.coordinate, FIXED))
 
     def lengthen(self, link: str, extension: float) -> "Chain":
-        """The same arm with a link and its descendants moved by `extension` [m] along the link's joint axis.
-
-        In a table of modified parameters this changes d of the link's row.
-        """
+        """The same arm with a link and its descendants moved by `extension` [m] along its axis: d of the link's row."""
         i, placement = self.links.index(link), self.placement.copy()
         placement[i, :3, 3] += extension * placement[i, :3, 2]
         table = tuple(row._replace(d=row.d + extension) if row.name == link else row for row in self.table)

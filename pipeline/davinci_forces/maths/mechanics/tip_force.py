@@ -81,10 +81,7 @@ def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
 
 
 def reach_95(f: ArrayLike, C: ArrayLike) -> Array:
-    """Radius (...,) of the 95 % ellipsoid of a covariance (..., 3, 3) in the direction of a force (..., 3).
-
-    The 95 % ellipsoid about f contains 0 if |f| is at most this radius.
-    """
+    """Largest |f| (...,) along f (..., 3) at which the 95 % ellipsoid of C (..., 3, 3) about f contains 0."""
     f, C = np.asarray(f, float), np.asarray(C, float)
     size = np.linalg.norm(f, axis=-1)
     u = np.divide(f, size[..., None], out=np.zeros(f.shape), where=size[..., None] > 0.0)

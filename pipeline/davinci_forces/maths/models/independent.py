@@ -65,10 +65,7 @@ class IndependentJoint:
         return Regressor(Phi, valid)
 
     def sensitivity(self, motion: ArmMotion) -> Array:
-        """Derivatives (N, 3, p) of the regressor by q, dq and ddq.
-
-        The derivative of sign(dq) is taken as zero, and states z of friction as constant.
-        """
+        """Derivatives (N, 3, p) of the regressor by q, dq and ddq, 0 for sign(dq) and for states z of friction."""
         c = np.array([term.coefficients for term in self.terms]).T
         _, by_q, by_dq = bias(tuple(c), motion.q, motion.dq, 0.0)
         return np.stack(np.broadcast_arrays(by_q, by_dq, [term.a for term in self.terms]), axis=1)

@@ -127,10 +127,7 @@ stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 
 def presliding_friction(displacement: float, number: int = 1) -> Term:
-    """The share of Coulomb friction that reverses within a displacement in the joint's units, not at once.
-
-    Its effort is 0 far from a reversal.  Several such terms count from 1.
-    """
+    """The share of Coulomb friction that reverses within a displacement in the joint's units; 0 far from a reversal."""
     name, phi = f"presliding friction {number}", f"(z_{number} - {SIGN})"
     return Term(name, phi, "{effort}", b={"z": 1.0, "sign(dq)": -1.0}, displacement=displacement)
 

@@ -46,10 +46,7 @@ class Harmonics:
         self._rest = t[self._even :].copy() if step else t  # a copy, because a view would keep all times in memory
 
     def project(self, x: Array) -> Array:
-        """Fit the coefficients to samples (N,) by least squares.
-
-        The harmonics are nearly orthogonal over whole periods, so their normal equations are well conditioned.
-        """
+        """Fit the coefficients to samples (N,) by least squares; over whole periods they are well conditioned."""
         return np.asarray(np.linalg.solve(self._gram, self._products(x)), dtype=np.float64)
 
     def evaluate(self, c: Array) -> Array:

@@ -196,10 +196,7 @@ class DayOffset(NamedTuple):
 
 
 def day_offset(t: Array, residual: Array, windows: Sequence[tuple[float, float]]) -> DayOffset:
-    """Average the residual effort (N,) of a model in windows [s] in which nothing touches the robot.
-
-    Without windows, or with fewer than two samples in them, the offset is 0 with error 0.
-    """
+    """Average the residual effort (N,) of a model in free windows [s]; 0 for fewer than two samples in them."""
     inside = residual[~is_outside(t, windows)]
     if len(inside) < 2:
         return DayOffset(0.0, 0.0, 0.0, 0.0)

@@ -204,10 +204,7 @@ def inertial_parameters(link: Element, file: TomlFile) -> Array:
 
 
 def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
-    """Read a joint; a joint of unknown type becomes a fixed joint, so that the links after it stay connected.
-
-    The axis of a fixed joint is ignored: exporters of CAD programs write 0 0 0.
-    """
+    """Read a joint; a joint of unknown type becomes a fixed joint, so that the links after it stay connected."""
     notes, kind = Notes(file, element), element.attributes.get("type", "")
     name = notes.name(element, "name", "its name")
     parent_link = notes.name(element.child("parent"), "link", 'its <parent link="..."/>')
@@ -216,6 +213,7 @@ def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
         remedy = "replace it by several of these" if kind in ("floating", "planar") else "correct it"
         notes.problem(f"type is {excerpt(kind)}, but must be {', '.join(MOVING)} or fixed; {remedy}")
         kind = "fixed"
+    # Exporters of CAD programs write 0 0 0 for a fixed joint.
     stated_axis = None if element.attributes.get("type") == "fixed" else element.child("axis")
     axis = np.array(notes.numbers(stated_axis, "xyz", [1.0, 0.0, 0.0]))
     length = float(np.linalg.norm(axis))

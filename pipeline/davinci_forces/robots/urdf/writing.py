@@ -26,10 +26,7 @@ FRAME_TOLERANCE = 1e-15  # largest rounding error of a frame that coincides with
 
 
 def text(robot: Robot, remarks: Sequence[str] = (), friction: Mapping[str, tuple[float, float]] | None = None) -> str:
-    """The text of the robot's URDF, with remarks at its head, and viscous and Coulomb friction by coordinate.
-
-    Raises BadRobot if the robot has no chain.
-    """
+    """The URDF of a robot, with remarks at its head and friction by coordinate; raises BadRobot without a chain."""
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
     chain, bodies, axes = _in_named_frames(robot.chain, robot.bodies)

@@ -112,10 +112,7 @@ def finite(value: float) -> float | None:
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
-    """Plot position, velocity and acceleration over one period, with their limits.  Fig 6.5
-
-    Raises BadRequest if the file's name does not end in one of PLOTS.
-    """
+    """Plot position, velocity and acceleration of a period, with limits; raises BadRequest unless in PLOTS.  Fig 6.5"""
     if path.suffix not in PLOTS:
         raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
     import matplotlib as mpl

@@ -28,10 +28,7 @@ def shipped_scenarios() -> tuple[str, ...]:
 
 
 def load(scenario: str) -> Scenario:
-    """Read a scenario: a shipped one by its name, or a file by its path.
-
-    Raises BadScenario if it does not exist or has problems; the message lists all of them, one a line.
-    """
+    """Read a scenario, shipped by its name, or by its path; raises BadScenario with all of its problems, one a line."""
     if scenario in shipped_scenarios():
         text = files("davinci_forces.simulation").joinpath("shipped", f"{scenario}.toml").read_text(encoding="utf-8")
         table = toml.parse(text, scenario, BadScenario)
