@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_parts, gather_blocks, tracker
 from davinci_forces.filters.error_bands import total_variance
-from davinci_forces.filters.problem import NoiseModel, Tracked, filter_inputs
+from davinci_forces.filters.problem import Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise, rounding_error
 from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
@@ -26,22 +26,18 @@ def run(
 
     The effect of other joints and of the friction's memory enters by the measured motion.  (7.6)-(7.16)
     """
-    if noise is not None:
-        yield from track_effort(model, noise_model(noise, joint, 1.0 / model.rate, q_tau), band, entry, joint)
+    if noise is None:
+        message = "no identification log gives the noise of the filter, so its external effort is not estimated"
+        yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {message}")
         return
-    message = "no identification log gives the noise of the filter, so its external effort is not estimated"
-    yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {message}")
-
-
-def track_effort(
-    model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry, joint: Joint
-) -> Iterator[Track | Diagnostic]:
-    """Estimate the external effort of one joint of a log, with its error."""
+    filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)
     parts, moving = filter_inputs(model), (model.unscored == 0) | bool(model.at_rest)
     offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
     is_long = len(model) > BLOCK_SAMPLES  # then the filter runs once more, block by block, to take less memory
-    estimate = filter_parts(DEFAULT, parts, noise, ("tau_ext", "tau_ext_std", "nis") if is_long else Tracked._fields)
+    estimate = filter_parts(
+        DEFAULT, parts, filter_noise, ("tau_ext", "tau_ext_std", "nis") if is_long else Tracked._fields
+    )
     if diverges(estimate.tau_ext, nis := float(np.mean(estimate.nis))):
         yield divergence_warning(model, nis)
         if not np.isfinite(estimate.tau_ext).all():
@@ -50,13 +46,15 @@ def track_effort(
         yield drift_warning(model, offset, joint.unit("{effort}"))
     free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     numbers = numbers_of(estimate, offset, converged, free)
-    blocks = gather_blocks(filter_blocks(DEFAULT, parts, noise)) if is_long else [(slice(0, len(model)), estimate)]
+    blocks = (
+        gather_blocks(filter_blocks(DEFAULT, parts, filter_noise)) if is_long else [(slice(0, len(model)), estimate)]
+    )
     del estimate
-    smoothed, own = filter_parts(SMOOTHER, parts, noise, ("tau_ext", "tau_ext_std"))[2:4]
-    late = lag_error(parts, smoothed, noise)
+    smoothed, own = filter_parts(SMOOTHER, parts, filter_noise, ("tau_ext", "tau_ext_std"))[2:4]
+    late = lag_error(parts, smoothed, filter_noise)
     variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
-    smooth_rise = rise(tracker(SMOOTHER), parts[0], noise)
+    smooth_rise = rise(tracker(SMOOTHER), parts[0], filter_noise)
     rounding = np.concatenate([
         rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
         for part in segments(model.segment)
@@ -75,10 +73,10 @@ def track_effort(
         model_variance = np.maximum(variance[rows] - own[rows] ** 2, 0.0)
         yield Track.like(
             estimate,
-            noise,
+            filter_noise,
             part,
             filter=DEFAULT,
-            q_tau=noise.q_tau * model.rate**0.5,
+            q_tau=filter_noise.q_tau * model.rate**0.5,
             day_offset=offset.value,
             day_offset_std=offset.std,
             band_from=source,
