@@ -7,14 +7,13 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import free_smoothed, free_space
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-MIN_SAMPLES_LEVEL = 100  # of free space
 TOUCHED = 3.0  # largest effort of a log over its typical alarm level; recorded free motion stays below 1.7
 
 
@@ -30,7 +29,7 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     )
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
-    if entry.role != "contact" and int(smoothed.sum()) >= MIN_SAMPLES_LEVEL:
+    if entry.role != "contact" and int(smoothed.sum()) >= MIN_FREE_SAMPLES:
         yield from touch_warning(track, smoothed, robot)
 
 
@@ -56,7 +55,7 @@ def touch_warning(track: Track, free: Booleans, robot: Robot) -> Iterator[Diagno
 
 def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans) -> Iterator[FreeSpace]:
     """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples."""
-    if int(free.sum()) < MIN_SAMPLES_LEVEL:
+    if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])

@@ -10,14 +10,13 @@ from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel, R
 from davinci_forces.filters.response import DURATION, half_sine, noise_model, response
 from davinci_forces.identification.joint_models import FALLBACK, Identified, LogModels
 from davinci_forces.maths.arrays import Array, Booleans, runs
-from davinci_forces.maths.signals.windows import free_space
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_space
 from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry
 
 PUSH = {Kind.REVOLUTE: 0.5, Kind.PRISMATIC: 2.0}  # [N m], [N]
-MIN_SAMPLES_COMPARISON = 100  # samples of free space
 MIN_PUSH_SHARE = 0.5  # peak of the filtered push over the true peak; below this share, a warning is given
 INDEPENDENT = f"{DEFAULT}-independent"  # the default filter with the joint's own terms
 
@@ -31,7 +30,7 @@ def run(
     """
     free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     unfitted = entry.role != "identification" and entry.has_known_free_motion
-    if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
+    if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_FREE_SAMPLES:
         return
     joint = robot.joint(model.joint)
     for label, name, variant in variants(model, Identified(robot, fits)):

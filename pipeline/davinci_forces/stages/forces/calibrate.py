@@ -8,7 +8,7 @@ from davinci_forces.filters import diverges, filter_parts
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.maths.arrays import Array, evenly
-from davinci_forces.maths.signals.windows import free_smoothed
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, MIN_LOGS_BAND, count_uncorrelated
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel, by_name
@@ -16,7 +16,6 @@ from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Joint
 from davinci_forces.study import LogEntry
 
-MIN_SAMPLES_BAND = 100  # of free motion
 MAX_LOGS_BAND = 20
 MAX_ROWS_BAND = 1000  # of a log, evenly spaced; fewer of them are uncorrelated
 
@@ -31,7 +30,7 @@ def run(
     if not entry.has_known_free_motion or model.at_rest or noise is None or not model.scheme:
         return
     free = free_smoothed(model.t, entry.possible_contact, model.rate, model.unscored)
-    if int(free.sum()) < MIN_SAMPLES_BAND:
+    if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)
     parts = filter_inputs(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))

@@ -13,14 +13,13 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.maths.signals.windows import free_space
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_space
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track, by_name
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 ROLES = ("validation", "contact")
-MIN_SAMPLES = 100  # of free motion
 MEDIAN_STD = 1.2533  # standard error of a median over that of a mean, of normal values
 LONG = 3.0  # a contact is long if it lasts this multiple of the delay
 
@@ -84,7 +83,7 @@ def compare(
 ) -> Iterator[Streamed]:
     """Compare the streamed external effort (N,) of a joint in free motion and in contacts with the smoother's."""
     free = free_space(track.t, entry.possible_contact, track.rate, track.unscored)
-    if int(free.sum()) < MIN_SAMPLES:
+    if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     statistics = free_motion_statistics(tau_ext, free, track.rate)
     rms, rms_std = root_mean_square(tau_ext[free])

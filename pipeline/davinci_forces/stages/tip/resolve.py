@@ -10,7 +10,7 @@ from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
 from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, is_singular, matrix, shared_correlations
-from davinci_forces.maths.signals.windows import free_smoothed
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records.forces import Contact, Track
 from davinci_forces.records.record import Diagnostic, diagnostic, join_names
@@ -19,7 +19,6 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 TIP_JOINTS = 3  # number of joints that carry the tip; the wrist is assumed to be straight
-MIN_SAMPLES_FREE_SPACE = 100
 MAX_LOGS_CORRELATION = 20
 UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 
@@ -34,7 +33,7 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
         return
     free = free_of(moving, entry)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
-    if errors.shape[1] < MIN_SAMPLES_FREE_SPACE or not errors.std(1).all():
+    if errors.shape[1] < MIN_FREE_SAMPLES or not errors.std(1).all():
         return
     rho = np.corrcoef(errors)
     yield JointCorrelation(entry.name, errors.shape[1], float(rho[0, 1]), float(rho[0, 2]), float(rho[1, 2]))
@@ -93,8 +92,15 @@ def why_unknown(tracks: dict[str, Track], robot: Robot, chain: Chain) -> str:
         remedy = "make joints that stand still `fixed` in its URDF, or use the external efforts of the joints"
         return f"{robot.name} has {len(robot.joints)} joints, and {moment}; {remedy}"
     names = [joint.name for joint in robot.joints]
-    if missing := "; ".join(missing_joints(names, tracks)):
-        return missing
+    missing = [
+        f"{name} is at rest, where friction hides its effort; move it"
+        if name in tracks
+        else f"the external effort of {name} is not known, because it is not recorded or has no fit"
+        for name in names
+        if name not in tracks or tracks[name].at_rest
+    ]
+    if missing:
+        return "; ".join(missing)
     if currents := [joint.name for joint in robot.joints if joint.effort]:
         return f"the effort of {join_names(currents)} is a current, not a force; state torque_constant"
     q = np.column_stack([tracks[name].q for name in names])
@@ -102,15 +108,6 @@ def why_unknown(tracks: dict[str, Track], robot: Robot, chain: Chain) -> str:
         why = "no pose determines all its directions, as where the last frame lies on a joint's axis"
         return f"{why}; add a fixed link to the tip of the tool"
     return ""
-
-
-def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
-    """State why the effort of joints is not known in a log."""
-    for name in names:
-        if name not in tracks:
-            yield f"the external effort of {name} is not known, because it is not recorded or has no fit"
-        elif tracks[name].at_rest:
-            yield f"{name} is at rest, where friction hides its effort; move it"
 
 
 def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array, str]:
@@ -132,7 +129,7 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
     near = blur > NEAR_SINGULAR
     tested = free & ~near
     space = UNKNOWN
-    if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE:  # within the 95 % ellipsoids
+    if int(tested.sum()) >= MIN_FREE_SAMPLES:  # within the 95 % ellipsoids
         reach = evaluate_in_blocks(lambda k: tip_force.reach_95(f[k], C[k]), np.flatnonzero(tested))
         space = levels(np.linalg.norm(f[tested], axis=1), reach / NORMAL_95)
     return TipForce(
@@ -197,7 +194,12 @@ def tip_contacts(
     """The largest force in each window in which the force is known."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     size = np.where(np.isnan(f[:, 0]), -1.0, np.linalg.norm(f, axis=1))
-    peaks = [(*window, k) for window in windows if (k := peak_sample(force.t, size, window)) is not None]
+    peaks = []
+    for start, end, is_stated in windows:
+        inside = np.where((force.t >= start) & (force.t <= end), size, -1.0)
+        k = int(np.argmax(inside))
+        if inside[k] > 0.0:
+            peaks.append((start, end, is_stated, k))
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
@@ -236,10 +238,3 @@ def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Inte
     sigma, axes = tip_force.sigma_ellipsoid(C_peak)
     share = np.einsum("nki,ni->nk", axes, lost) / np.maximum(sigma, np.finfo(float).tiny)
     return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes)), lost
-
-
-def peak_sample(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:
-    """Index of the largest magnitude (N,) of the force within a window; None if no magnitude is above 0."""
-    inside = np.where((t >= window[0]) & (t <= window[1]), size, -1.0)
-    k = int(np.argmax(inside))
-    return k if inside[k] > 0.0 else None
