@@ -19,10 +19,10 @@ from time import sleep
 from typing import Annotated, Any
 
 import typer
-from typer import Argument, Option
+from typer import Option
 from typer.core import TyperCommand, TyperGroup
 
-from davinci_forces.commands import COMMANDS
+from davinci_forces.commands import COMMANDS, Processed, Reports, Studies, StudyFolder
 from davinci_forces.errors import PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.runner import ALL
@@ -76,10 +76,6 @@ app = typer.Typer(
     rich_markup_mode="markdown",  # the default omits units in square brackets
 )
 
-StudyFolder = Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")]
-Studies = Annotated[list[Path] | None, Argument(help="Folders of studies; without any, all studies in raw/.")]
-Processed = Annotated[Path | None, Option(help="Folder for processed files, instead of processed/ next to raw/.")]
-Reports = Annotated[Path | None, Option(help="Folder for reports, instead of reports/ next to raw/.")]
 Force = Annotated[bool, Option("--force", help="Run the stages of this command even if they are up to date.")]
 Jobs = Annotated[int, Option(min=1, help="Number of processes to run tasks in.")]
 Cluster = Annotated[
@@ -170,8 +166,10 @@ def errors_as_messages() -> Iterator[None]:
         return
     except BrokenPipeError:  # the reader of the output has closed the pipe
         raise
-    except (PipelineError, OSError) as error:
+    except PipelineError as error:
         message = f"{error}"
+    except OSError as error:
+        message = f"{error.filename}: {error.strerror}" if error.filename else f"{error}"
     except UnicodeEncodeError as error:
         excerpt = error.object[max(error.start - 40, 0) : error.end + 40]
         message = f"a name is not in UTF-8: {excerpt!r}; rename the file or the folder"

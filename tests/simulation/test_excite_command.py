@@ -7,6 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from davinci_forces import cli
 from davinci_forces.commands import excite
 from davinci_forces.errors import BadRequest, BadRobot
 from davinci_forces.simulation.excitation import request
@@ -164,15 +165,13 @@ def test_a_plot_is_the_same_bytes_twice(tmp_path, suffix):
         (["davinci", "hand_pitch", "--dq", "0.1,0.5"], "hand_pitch: the velocity of a periodic motion"),
         (["davinci", "hand_pitch", "--q", "2"], "--q takes lower,upper"),
         (["davinci", "hand_pitch", "--evaluate", "1,2"], "--evaluate takes a0,a1,b1,a2,b2"),
-        (["davinci", "hand_pitch", "--evaluate", "1,x,2"], "--evaluate takes numbers"),
+        (["davinci", "hand_pitch", "--evaluate", "1,x,2"], "value 2 is 'x', not a number"),
         (["davinci", "hand_pitch", "--evaluate", "1,nan,2"], "finite"),
         (["davinci", "all", "--evaluate", PITCH], "name it instead of `all`"),
         (["davinci", "hand_pitch", "--period", "-1"], "--period must be positive"),
         (["davinci", "hand_pitch", "--criterion", "volume"], "--criterion is one of determinant, condition"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "a.txt"], "the name of a plot must end in"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--rate", "nan", "--csv", "a.csv"], "--rate must be positive"),
-        (["davinci", "hand_pitch", "--evaluate", PITCH, "--csv", "no/a.csv"], "a.csv: No such file or directory"),
-        (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "no/a.svg"], "a.svg: No such file or directory"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--rate", "33.33", "--csv", "a.csv"], "whole number"),
     ],
 )
@@ -182,6 +181,14 @@ def test_what_cannot_be_met_is_refused_with_the_remedy(words, says, tmp_path, mo
         call(*words)
     assert says in str(error.value)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("option", "file"), [("--csv", "no/a.csv"), ("--plot", "no/a.svg")])
+def test_a_file_that_cannot_be_written_is_named(option, file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = CliRunner().invoke(cli.app, ["excite", "davinci", "hand_pitch", "--evaluate", PITCH, option, file])
+    assert said.exit_code == 1
+    assert f"error: {file}: No such file or directory" in said.output
 
 
 def test_an_unknown_joint_is_answered_with_the_joints_there_are():

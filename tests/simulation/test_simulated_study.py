@@ -242,7 +242,7 @@ def test_another_study_or_a_log_in_the_folder_is_refused_in_one_message_and_noth
 
 def test_a_place_that_cannot_be_written_to_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(BadRequest, match="file"):
+    with pytest.raises(OSError, match="file"):
         simulate.run(str(short(tmp_path)), tmp_path / "file" / "out")
 
 

@@ -3,16 +3,15 @@
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Option
 
+from davinci_forces.commands import Reports, Studies
 from davinci_forces.runner.console import echo
 
 
 def run(
-    studies: Annotated[
-        list[Path] | None, Argument(help="Folders of studies; without any, all studies in raw/.")
-    ] = None,
-    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    studies: Studies = None,
+    reports: Reports = None,
     out: Annotated[
         Path | None, Option(help="Folder for campaign.html and campaign.pdf, instead of the reports' folder.")
     ] = None,

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.commands import Reports
 from davinci_forces.report.changes import RANKS, Change, StatedValue, by_joint, changes
 from davinci_forces.runner.console import echo, table
 from davinci_forces.runner.results import stated
@@ -24,7 +25,7 @@ LARGEST = 10  # changes of a joint that are listed
 def run(
     a: Annotated[Path, Argument(help="A results.json, or a study, raw/<study>, that has one.")],
     b: Annotated[Path, Argument(help="The results.json or study to compare with it.")],
-    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    reports: Reports = None,
     every: Annotated[bool, Option("--all", help="List every change, not the ten largest of each joint.")] = False,
     as_json: Annotated[bool, Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")] = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from davinci_forces.errors import BadRequest
+from davinci_forces.commands import AsJson
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(
     csv: Annotated[Path | None, Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,
     run_in: Annotated[bool, Option(help="Begin the table of --csv with a run-in from rest, before t = 0.")] = True,
     plot: Annotated[Path | None, Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
-    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Minimise the criterion over Fourier series that keep the limits at every instant.
 
@@ -70,15 +70,11 @@ def run(
         robot, joint, evaluate, period, harmonics, criterion, limits, starts, seed, samples, noise, around
     )
     answered = answer(request, _progress())
-    of_arm = answered.arm.limits if answered.arm else None
-    try:
-        if csv:
-            table = trajectory.table(answered.trajectories, rate, run_in, of_arm)
-            csv.write_text(table, encoding="utf-8", newline="\n")
-        if plot:
-            trajectory.plot(answered.trajectories, plot)
-    except OSError as error:
-        raise BadRequest(f"{error.filename}: {error.strerror}") from None
+    if csv:
+        table = trajectory.table(answered.trajectories, rate, run_in, answered.arm.limits if answered.arm else None)
+        csv.write_text(table, encoding="utf-8", newline="\n")
+    if plot:
+        trajectory.plot(answered.trajectories, plot)
     echo(json.dumps(_document(robot, answered), indent=2) if as_json else _format_text(answered))
 
 

@@ -7,8 +7,9 @@ connects to a robot.
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Option
 
+from davinci_forces.commands import Processed, Reports, StudyFolder
 from davinci_forces.errors import BadRequest
 from davinci_forces.exports import FORMATS
 from davinci_forces.files import write_folder
@@ -16,7 +17,7 @@ from davinci_forces.runner.console import echo
 
 
 def run(
-    study: Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
+    study: StudyFolder,
     to: Annotated[str, Option("--to", metavar="|".join(FORMATS), help=f"Format: {', '.join(FORMATS)}.")],
     out: Annotated[Path | None, Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
     joint: Annotated[
@@ -26,10 +27,8 @@ def run(
     despite_verdict: Annotated[
         bool, Option("--despite-verdict", help="Export a joint with the verdict Problem, or a rejected study.")
     ] = False,
-    processed: Annotated[
-        Path | None, Option(help="Folder for processed files, instead of processed/ next to raw/.")
-    ] = None,
-    reports: Annotated[Path | None, Option(help="Folder for reports, instead of reports/ next to raw/.")] = None,
+    processed: Processed = None,
+    reports: Reports = None,
 ) -> None:
     """Run all stages that are not up to date, and write a folder of files, whole or not at all."""
     from davinci_forces.exports import renderer

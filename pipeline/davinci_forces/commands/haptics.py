@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.commands import AsJson
 from davinci_forces.errors import BadRequest
 from davinci_forces.files import write_bytes
 from davinci_forces.runner.console import echo
@@ -22,7 +23,7 @@ def run(
     scenario: Annotated[
         Path | None, Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
     ] = None,
-    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    as_json: AsJson = False,
     csv: Annotated[
         Path | None, Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
     ] = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+from davinci_forces.commands import AsJson
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.runner.console import echo
 
@@ -26,7 +27,7 @@ def run(
     dq: Annotated[
         str | None, Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
     ] = None,
-    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    as_json: AsJson = False,
     urdf: Annotated[bool, Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
     thesis: Annotated[
         bool,
@@ -38,6 +39,7 @@ def run(
     For a robot without known geometry, print its joints only.
     """
     from davinci_forces.robots import load
+    from davinci_forces.toml import numbers_of_option
 
     arm = load(robot, Path())
     if thesis:
@@ -49,8 +51,12 @@ def run(
         echo(writing.text(arm), nl=False)
         return
     n = arm.chain.n if arm.chain else 0
-    q = _values("--at", at) if at is not None else [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
-    document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
+    q = (
+        numbers_of_option("--at", at)
+        if at is not None
+        else [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
+    )
+    document = _document(arm, q, numbers_of_option("--dq", dq) if dq is not None else [])
     echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
 
 
@@ -66,23 +72,6 @@ def _index(robot: "Robot") -> str:
     except MissingRecord:
         return thesis.text({})
     return thesis.text({key: (value, std) for key, value, std in table[["value", "std"]].itertuples()})
-
-
-def _values(option: str, text: str) -> list[float]:
-    """Read numbers separated by commas."""
-    from davinci_forces.toml import unlikely
-
-    values = []
-    for place, word in enumerate(text.split(","), start=1):
-        try:
-            values.append(float(word))
-        except ValueError:
-            raise BadRequest(f"{option} {text}: value {place} is {word.strip()!r}, not a number") from None
-        if not math.isfinite(values[-1]):
-            raise BadRequest(f"{option} {text}: value {place} is {word.strip()}, and must be finite")
-        if wrong := unlikely(f"value {place}", values[-1], "motion"):
-            raise BadRequest(f"{option} {text}: {wrong}")
-    return values
 
 
 def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
 
@@ -22,7 +21,4 @@ def run(
     from davinci_forces.simulation.scenario.reading import load
 
     study_folder.check(out, force)
-    try:
-        study_folder.write(load(scenario), out, force, echo)
-    except OSError as error:
-        raise BadRequest(f"{error.filename}: {error.strerror}") from None
+    study_folder.write(load(scenario), out, force, echo)

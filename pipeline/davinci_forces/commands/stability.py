@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
+from davinci_forces.commands import AsJson
 from davinci_forces.errors import BadRequest
 from davinci_forces.runner.console import echo
 
@@ -27,7 +28,7 @@ def run(
         float | None, Option(help="Delay [s] of the force on the hand, due to filter and data link.")
     ] = None,
     rate: Annotated[float | None, Option(help="Rate [Hz] at which the hand receives a new force.")] = None,
-    as_json: Annotated[bool, Option("--json", help="Print the result as JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print the largest stable tissue stiffness K_T [N/m]: by (8.10), by arbitrary switching, by delay and sampling."""
     hand = _hand(k_h, b_h, m, delay, rate)

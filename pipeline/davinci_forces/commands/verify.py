@@ -1,19 +1,17 @@
 """Check that no file of a study was altered or is missing, and that its records give the same report again."""
 
-from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Option
 
+from davinci_forces.commands import Processed, Reports, StudyFolder
 from davinci_forces.runner.console import echo
 
 
 def run(
-    study: Annotated[Path, Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
-    processed: Annotated[
-        Path | None, Option(help="Folder of processed files, instead of processed/ next to raw/.")
-    ] = None,
-    reports: Annotated[Path | None, Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
+    study: StudyFolder,
+    processed: Processed = None,
+    reports: Reports = None,
     report_id: Annotated[
         str, Option("--id", help="Check that the study has this report ID, as printed in its report.")
     ] = "",

@@ -10,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.errors import PipelineError
+from davinci_forces.errors import BadRequest, PipelineError
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.toml.lines import KeyPath, TomlFile, excess, lines_of
 
@@ -50,6 +50,24 @@ def unlikely(key: str, value: float, kind: str = "") -> str:
     if not value or least <= abs(value) <= most:
         return ""
     return f"{key} must lie between {least:g} and {most:g} {unit}".rstrip() + (" in size" if value < 0 else "")
+
+
+def numbers_of_option(option: str, text: str) -> list[float]:
+    """Read the numbers of an option of a command, separated by commas: positions, velocities, lengths or efforts.
+
+    Raises BadRequest if one is not a number, not finite, or of an unlikely size.
+    """
+    values = []
+    for place, word in enumerate(text.split(","), start=1):
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()!r}, not a number") from None
+        if not math.isfinite(values[-1]):
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()}, and must be finite")
+        if wrong := unlikely(f"value {place}", values[-1], "motion"):
+            raise BadRequest(f"{option} {text}: {wrong}")
+    return values
 
 
 def is_number(value: Any) -> bool:

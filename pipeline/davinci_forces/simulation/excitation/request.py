@@ -20,7 +20,7 @@ from davinci_forces.maths.models.coupled import LINK_UNITS
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.simulation.excitation.trajectory import PERIODS, ExcitationTrajectory, ExpectedParameter
-from davinci_forces.toml import unlikely
+from davinci_forces.toml import numbers_of_option, unlikely
 
 STARTS, STARTS_OF_ARM = 24, 2  # an arm's starts take longer, and agree better
 WHOLE_TURN = (-math.pi, math.pi)  # [rad] positions of a revolute joint without limits
@@ -154,7 +154,7 @@ def _excitation(
         except ValueError as error:
             raise BadRequest(f"{joint.name}: {error}") from None
         return ExcitationTrajectory(joint, problem, series, tuple(optima.tolist()), noise)
-    x = _numbers("--evaluate", request.evaluate)
+    x = numbers_of_option("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
         raise BadRequest(f"--evaluate takes a0,a1,b1,a2,b2, or a0 and a pair for each harmonic, not {len(x)} numbers")
     problem = replace(problem, harmonics=(len(x) - 1) // 2)
@@ -163,7 +163,7 @@ def _excitation(
 
 def _noise(text: str | None, n: int) -> list[float]:
     """The noise of each joint's effort; 0 if it is not stated."""
-    values = _numbers("--noise", text) if text else [0.0]
+    values = numbers_of_option("--noise", text) if text else [0.0]
     if len(values) not in (1, n) or (text and min(values) <= 0):
         raise BadRequest(f"--noise takes one positive number, or {n} for the joints in their order, not {text!r}")
     return values * n if len(values) == 1 else values
@@ -173,7 +173,7 @@ def _obstacles(request: Request) -> Obstacles:
     floor, texts = request.around
     boxes: list[Box] = []
     for text in texts:
-        box = _numbers("--box", text)
+        box = numbers_of_option("--box", text)
         if len(box) != 6 or any(low >= high for low, high in zip(box[:3], box[3:], strict=True)):
             raise BadRequest(f"--box takes the lowest x,y,z and, all higher, the highest x,y,z, not {text!r}")
         boxes.append((box[0], box[1], box[2], box[3], box[4], box[5]))
@@ -183,19 +183,7 @@ def _obstacles(request: Request) -> Obstacles:
 
 
 def _limits(option: str, text: str) -> Range:
-    values = _numbers(option, text)
+    values = numbers_of_option(option, text)
     if len(values) != 2 or values[0] >= values[1]:
         raise BadRequest(f"{option} takes lower,upper with lower < upper, not {text!r}")
     return values[0], values[1]
-
-
-def _numbers(option: str, text: str) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise BadRequest(f"{option} takes numbers separated by commas, not {text!r}") from None
-    if not all(map(math.isfinite, values)):
-        raise BadRequest(f"{option} takes finite numbers, not {text!r}")
-    if problem := next(filter(None, (unlikely(option, x, "motion") for x in values)), ""):
-        raise BadRequest(f"{problem}, not {text!r}")
-    return values
