@@ -427,9 +427,9 @@ def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():
 def test_leaving_out_units_gives_the_standard_error_of_a_mean_of_units():
     random, unit = np.random.default_rng(5), np.repeat(np.arange(8), 50)
     x = random.normal(size=8)[unit]  # all that differs is between units
-    found = bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), unit)
-    assert found == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
-    assert np.isnan(bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
+    without = np.array([[x[unit != number].mean()] for number in range(8)])
+    assert bootstrap.of_left_out(without) == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
+    assert np.isnan(bootstrap.of_left_out(without[:1])).all()
 
 
 def test_the_pdf_prints_the_contacts_that_are_largest_beside_their_joints_level():

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Integers
 
 BOOTSTRAP_BLOCKS = 20
 DRAWS = 200
@@ -116,14 +116,8 @@ def root(square: float, std: float) -> tuple[float, float]:
     return value, min(std / (2.0 * value), bound) if value > 0 else bound
 
 
-def jackknife_std(statistic: Callable[[Booleans], Array], units: Integers) -> Array:
-    """Jackknife the standard error (p,) of a statistic of a mask of samples (N,) by their `units`; NaN for one unit."""
-    numbers = np.unique(units)
-    return of_left_out(np.array([statistic(units != n) for n in numbers] if len(numbers) > 1 else [[np.nan]]))
-
-
 def of_left_out(left_out: Array) -> Array:
-    """Standard error (p,) from the values (n, p) of a statistic without each of n units."""
+    """Standard error (p,) from the values (n, p) of a statistic without each of n units; NaN for a single unit."""
     n = len(left_out)
     if n < 2:
         return np.full(left_out.shape[1], np.nan)

@@ -9,7 +9,7 @@ from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.maths.arrays import Array, evenly
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
-from davinci_forces.maths.uncertainty import bootstrap
+from davinci_forces.maths.uncertainty.bootstrap import of_left_out
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, MIN_LOGS_BAND, count_uncorrelated
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel, by_name
 from davinci_forces.records.forces import SMOOTHER
@@ -48,29 +48,25 @@ def run(
 
 
 def gather(motions: Iterable[FreeMotion]) -> Iterator[ErrorBand]:
-    """Collect the out-of-sample model error of all logs, one error band per joint."""
-    for joint, joint_motions in by_name(motions, "joint").items():
-        yield band(joint, [joint_motions[i] for i in evenly(len(joint_motions), MAX_LOGS_BAND)])
-
-
-def band(joint: str, motions: list[FreeMotion]) -> ErrorBand:
-    """The error band of a joint: the errors of all its logs, one log after the other."""
+    """Collect the out-of-sample model error of all logs, one error band per joint, one log after the other."""
     names = ("block", "dq", "tau_ext_smooth", "tau_ext_std_filter", "uncorrelated")
-    columns = {name: np.concatenate([getattr(motion, name) for motion in motions]) for name in names}
-    lengths = [len(motion) for motion in motions]
-    logs = np.repeat(np.arange(len(motions)), lengths)
-    errors = columns["tau_ext_smooth"]
-    parts = logs if len(motions) >= MIN_LOGS_BAND else logs * LOG_BLOCKS + columns["block"]
-    return ErrorBand(
-        joint=joint,
-        band_rms=float(rms(errors)[0]),
-        band_rms_std=float(bootstrap.jackknife_std(lambda which: rms(errors[which]), parts)[0]),
-        source=np.repeat(np.array([motion.log for motion in motions], object), lengths),
-        path_of=np.repeat(np.array([motion.path for motion in motions], object), lengths),
-        **columns,
-    )
+    for joint, joint_motions in by_name(motions, "joint").items():
+        used = [joint_motions[i] for i in evenly(len(joint_motions), MAX_LOGS_BAND)]
+        columns = {name: np.concatenate([getattr(motion, name) for motion in used]) for name in names}
+        lengths = [len(motion) for motion in used]
+        logs = np.repeat(np.arange(len(used)), lengths)
+        errors = columns["tau_ext_smooth"]
+        parts = logs if len(used) >= MIN_LOGS_BAND else logs * LOG_BLOCKS + columns["block"]
+        yield ErrorBand(
+            joint=joint,
+            band_rms=rms(errors),
+            band_rms_std=float(of_left_out(np.array([[rms(errors[parts != part])] for part in np.unique(parts)]))[0]),
+            source=np.repeat(np.array([motion.log for motion in used], object), lengths),
+            path_of=np.repeat(np.array([motion.path for motion in used], object), lengths),
+            **columns,
+        )
 
 
-def rms(errors: Array) -> Array:
-    """Root mean square (1,) of errors (C,)."""
-    return np.array([np.sqrt(np.mean(errors**2))])
+def rms(errors: Array) -> float:
+    """Root mean square of errors (C,)."""
+    return float(np.sqrt(np.mean(errors**2)))

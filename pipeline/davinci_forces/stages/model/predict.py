@@ -80,7 +80,9 @@ def predict_joint(
     if steps := spans(motion.t, ~scored & is_evaluated(motion)):
         lost = sum(end - start for start, end in steps) / (motion.t[-1] - motion.t[0])
         severity = "warning" if lost > MIN_LOST else "note"
-        texts = [step_warning(name, *step) for step in steps]
+        why = "the effort changes there in a step that the motion does not explain"
+        remedy = "as where a controller starts or stops; leave them out by `skip` and `until`"
+        texts = [f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}, {remedy}" for start, end in steps]
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", severity, *texts)
     if labelled:
         yield from sign_warning(motion, along.tau_hat(labelled[-1][2], motion.joint), free)
@@ -194,12 +196,6 @@ def unscored_flags(motion: Motion, scored: Booleans) -> Counts:
     """The flags (N,) of samples that are not scored; a sample that is only filled in has no transient."""
     alone = (motion.filled > 0) & (motion.standing == 0)
     return np.where(scored, 0, np.where(alone, UNSCORED_SAMPLE, UNSCORED_STRETCH))
-
-
-def step_warning(name: str, start: float, end: float) -> str:
-    """State which part of a log is not scored, and the remedy."""
-    why = "the effort changes there in a step that the motion does not explain, as where a controller starts or stops"
-    return f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}; leave them out by `skip` and `until`"
 
 
 def inertia_warning(motion: Motion, fit: Fit, identified: Identified) -> str:

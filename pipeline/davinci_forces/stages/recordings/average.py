@@ -9,12 +9,12 @@ from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.arrays import Integers
 from davinci_forces.maths.periods import averaging
 from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, multiple_of_period, stretch
-from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
+from davinci_forces.maths.periods.averaging import Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, harmonics_of, repetition
 from davinci_forces.maths.signals.smoothing import lowpass_segments, noise_std, segments, share_passed
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean
-from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
+from davinci_forces.records import Average, Diagnostic, PeriodResidual, Signal, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -131,7 +131,9 @@ def longest_stretch(
             other = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
             span, length = max((span, length), other, key=lambda each: each[0].stop - each[0].start)
     t, positions = t[span], [x[span] for x in positions]
-    factors = multiples(length, entry.period, whole_periods(t, length, rate))
+    stated = [round(entry.period / length)] if entry.period else []  # the factor of the stated period is tried first
+    most = whole_periods(t, length, rate) // 2
+    factors = [k for k in dict.fromkeys([*stated, *MULTIPLES]) if 2 <= k <= most]
     factor = multiple_of_period(t, positions, length, rate, factors)
     if factor > 1:
         length = refine(t, positions, factor * length, max_harmonics)
@@ -141,12 +143,6 @@ def longest_stretch(
             f"{length:.4f} s; record more periods"
         )
     return span, length
-
-
-def multiples(length: float, stated: float | None, periods: int) -> list[int]:
-    """Factors by which the period may be longer than `length`; the factor of the stated period is the first."""
-    stated_factor = [round(stated / length)] if stated else []
-    return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= periods // 2]
 
 
 def omissions(
@@ -220,7 +216,10 @@ def average_joint(
     rms_tau = float(np.sqrt(np.mean(slow_tau[used] ** 2))) or 1.0
     folded = {symbol: phased.fold(getattr(signal, symbol)[used]) for symbol in MEASURED}
     q, tau = folded["q"], folded["tau"]
-    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    # Noise that does not repeat and is faster than the motion: a ripple of the drive is fast, too, but it repeats, and
+    # errors that depend on the motion are slower.  The mean at each phase takes one degree of freedom.
+    correction = float(np.sqrt(len(tau.noise) / averaging.degrees_of_freedom(tau)))
+    white = noise_std(tau.noise, signal.segment[used], signal.rate, lowpass) * correction
     relative_noise = white * float(np.sqrt(share_passed(signal.rate, lowpass))) / rms_tau
     columns: dict[str, Any] = {}
     for symbol, x in folded.items():
@@ -243,13 +242,3 @@ def average_joint(
     )
     noise = {f"{symbol}_noise": x.noise for symbol, x in folded.items()}
     yield PeriodResidual(signal.log, signal.joint, t=phased.t, **noise)
-
-
-def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) -> float:
-    """Standard deviation of the noise that does not repeat and is faster than the motion.
-
-    The mean at each phase takes one degree of freedom.  A ripple of the drive is fast, too, but it repeats.  Errors
-    that depend on the motion are slower.
-    """
-    correction = float(np.sqrt(len(folded.noise) / averaging.degrees_of_freedom(folded)))
-    return noise_std(folded.noise, segment, rate, lowpass) * correction
