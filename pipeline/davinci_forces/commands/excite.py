@@ -131,8 +131,8 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
     lines = [f"{e.joint.name}: objective {e.objective:.4f}, condition {e.condition:.1f}, period {e.series.period:g} s"]
     lines += [_spread(facts["starts"])] if "starts" in facts else []
     lines += ["  " + "  ".join(f"{name} = {value:.6g}" for name, value in facts["coefficients"].items())]
-    stated = (e.joint.limits.q, e.joint.limits.dq, e.joint.limits.ddq)
-    for (symbol, (low, high)), limits, of_joint in zip(facts["ranges"].items(), e.problem.limits, stated, strict=True):
+    bounds = zip(facts["ranges"].items(), e.problem.limits, e.joint.limits.motion, strict=True)
+    for (symbol, (low, high)), limits, of_joint in bounds:
         lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {limits[0]:g} and {limits[1]:g}"]
         if not all(map(math.isfinite, of_joint)) and limits in (of_joint, WHOLE_TURN):
             lines[-1] += f": CHECK that the joint may move so, as no limit of {symbol} is stated; --{symbol} sets one"

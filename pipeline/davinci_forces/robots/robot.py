@@ -52,6 +52,11 @@ class Limits:
     ddq: tuple[float, float]
     effort: float = math.inf  # largest effort of the drive at the joint, in either direction
 
+    @property
+    def motion(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Bounds of position, velocity and acceleration."""
+        return self.q, self.dq, self.ddq
+
 
 UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
 

@@ -122,15 +122,10 @@ def excitations(joint: Joint) -> Iterator[Excitation]:
     """The published excitations of a joint, and the optimal one within its limits.  (6.27), Table 6.1"""
     for source, (period, *x) in joint.published:
         yield excitation_record(joint, source, Fourier.from_coefficients(np.array(x), period))
-    if joint.published and all(np.isfinite(pair).all() for pair in limits_of(joint)):
+    if joint.published and all(np.isfinite(pair).all() for pair in joint.limits.motion):
         period = joint.published[0][1][0]
-        problem = ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant")
+        problem = ExcitationProblem(joint.terms, joint.limits.motion, period, 2, "determinant")
         yield excitation_record(joint, "found", design(problem, STARTS, 0)[0])
-
-
-def limits_of(joint: Joint) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-    """Bounds of position, velocity and acceleration."""
-    return joint.limits.q, joint.limits.dq, joint.limits.ddq
 
 
 def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
@@ -138,7 +133,7 @@ def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
     F = fourier.observation(joint.terms, series)
     t = np.linspace(0.0, series.period, 401)
     q, dq, ddq = fourier.motion(series, t)
-    ranges = zip(fourier.ranges(series), limits_of(joint), strict=True)
+    ranges = zip(fourier.ranges(series), joint.limits.motion, strict=True)
     excess = [float(max(low - least, largest - high, 0.0)) for (least, largest), (low, high) in ranges]
     excesses = dict(zip(("excess_q", "excess_dq", "excess_ddq"), excess, strict=True))
     return Excitation(

@@ -129,8 +129,7 @@ def _standard_errors(
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
-    joint_limits = joint.limits.q, joint.limits.dq, joint.limits.ddq
-    options = zip(("--q", "--dq", "--ddq"), request.limits, joint_limits, strict=True)
+    options = zip(("--q", "--dq", "--ddq"), request.limits, joint.limits.motion, strict=True)
     q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
     missing = [name for name, pair in (("q", q), ("dq", dq)) if not all(map(math.isfinite, pair))]
     if joint.kind is Kind.REVOLUTE and not any(map(math.isfinite, q)):
