@@ -5,35 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.loads import (
-    MIN_ROWS,
-    errors_between,
-    external_effort,
-    loads_per_kilogram,
-    path_means,
-    period_of,
-    periods_of,
-    rows_of,
-    subtract_tare,
-    unseen_part,
-    whole_motion,
-)
-from davinci_forces.maths.contact.weighing import (
-    Agreement,
-    MassEstimate,
-    agreement,
-    better,
-    fit_mass,
-    model_errors,
-    offset,
-    offset_std,
-    pooled_std,
-    residual,
-    scaled_constant,
-    shares,
-    spread_between,
-    widening_factor,
-)
+from davinci_forces.identification import loads as paths
+from davinci_forces.maths.contact import weighing
+from davinci_forces.maths.contact.weighing import Agreement, MassEstimate
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
@@ -79,14 +53,16 @@ def run(
     if not relevant or not moving or robot.chain is None:
         return
     measured = {source.joint for source in entry.channels if source.symbol == "i"}
-    motion = whole_motion(motions, robot)
-    period = period_of([m for m in motions if m.joint in {model.joint for model in moving}], robot)
-    efforts = {model.joint: external_effort(model, model.tau_hat, lowpass) for model in moving}
+    motion = paths.whole_motion(motions, robot)
+    period = paths.period_of([m for m in motions if m.joint in {model.joint for model in moving}], robot)
+    efforts = {model.joint: paths.external_effort(model, model.tau_hat, lowpass) for model in moving}
     unseen = efforts
     if entry.role == "identification":
-        unseen = {model.joint: external_effort(model, model.tau_hat_unseen, lowpass) for model in moving}
-    for weighing in relevant:
-        sides = loads_per_kilogram(robot.chain, robot, weighing.weight.moves_with, weighing.weight.position, motion)
+        unseen = {model.joint: paths.external_effort(model, model.tau_hat_unseen, lowpass) for model in moving}
+    for weight_log in relevant:
+        sides = paths.loads_per_kilogram(
+            robot.chain, robot, weight_log.weight.moves_with, weight_log.weight.position, motion
+        )
         for model in moving:
             joint = robot.joint(model.joint)
             per_current = joint.gear_ratio if joint.effort else 1.0
@@ -99,18 +75,19 @@ def run(
                 for side in sides
             ]
             columns = {
-                "q": path_means(model.t, motion[0][:, column], first, length, count),
-                "load": path_means(model.t, loads[0], first, length, count),
-                "load_mirrored": path_means(model.t, loads[1], first, length, count),
-                "tau_ext": path_means(*efforts[model.joint], first, length, count),
-                "tau_ext_unseen": path_means(*unseen[model.joint], first, length, count),
+                "q": paths.path_means(model.t, motion[0][:, column], first, length, count),
+                "load": paths.path_means(model.t, loads[0], first, length, count),
+                "load_mirrored": paths.path_means(model.t, loads[1], first, length, count),
+                "tau_ext": paths.path_means(*efforts[model.joint], first, length, count),
+                "tau_ext_unseen": paths.path_means(*unseen[model.joint], first, length, count),
             }
             reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
-            each = periods_of((model.t, loads[0]), efforts[model.joint], first, length, count)
+            each = paths.periods_of((model.t, loads[0]), efforts[model.joint], first, length, count)
+            spread = weighing.spread_between(each) if np.abs(loads[0]).max() > MIN_LOAD else 0.0
             yield Load(
-                log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
+                log=model.log, joint=model.joint, weight=weight_log.log, role=model.role, rate=count / length,
                 period=period, is_current=int(bool(joint.effort) or joint.name in measured),
-                periods=len(each), period_spread=spread_between(each) if np.abs(loads[0]).max() > MIN_LOAD else 0.0,
+                periods=len(each), period_spread=spread,
                 t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
@@ -124,18 +101,18 @@ def gather(
     Joints whose effort is in A are left out, because a current is not a force.  A known mass gives the torque constant
     of each joint whose current was measured.
     """
-    usable = [load for load in loads if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD]
-    for weighing in weighings.each:
-        carrying = [load for load in usable if load.weight == weighing.log == load.log]
-        others = [load for load in usable if load.weight == weighing.log != load.log]
-        of_tare = [load for load in others if load.log == weighing.tare]
-        tare, fault = subtract_tare(carrying, of_tare) if weighing.tare and carrying else ([], "")
-        spread = errors_between(carrying, of_tare if tare else (), others)
-        constants = [*torque_constants(weighing, carrying, tare, others, robot, spread)]
+    usable = [load for load in loads if len(load) >= paths.MIN_ROWS and np.abs(load.load).max() > MIN_LOAD]
+    for weight_log in weighings.each:
+        carrying = [load for load in usable if load.weight == weight_log.log == load.log]
+        others = [load for load in usable if load.weight == weight_log.log != load.log]
+        of_tare = [load for load in others if load.log == weight_log.tare]
+        tare, fault = paths.subtract_tare(carrying, of_tare) if weight_log.tare and carrying else ([], "")
+        spread = paths.errors_between(carrying, of_tare if tare else (), others)
+        constants = [*torque_constants(weight_log, carrying, tare, others, robot, spread)]
         yield from constants
         weight_loads, tare = ([ls for ls in of if not robot.joint(ls.joint).effort] for of in (carrying, tare))
         if not weight_loads:
-            link = weighing.weight.moves_with or "the tip"
+            link = weight_log.weight.moves_with or "the tip"
             message = f"no moving joint carries the mass on {link}, or none of them has a fit"
             remedy = "move a joint that the mass loads"
             if carrying:
@@ -145,17 +122,17 @@ def gather(
                 if values := [f"torque_constant = {of.torque_constant:.4g} for {of.joint}" for of in records]:
                     remedy = f"this known mass gives {join_names(values)}; write each in "
                     remedy += '[robot_overrides.<joint>] of study.toml, in place of effort = "A"'
-            text = f"{weighing.log}: {message}; no mass is estimated: {remedy}"
-            yield diagnostic("weigh", f"{weighing.log}.mass", "warning", text)
+            text = f"{weight_log.log}: {message}; no mass is estimated: {remedy}"
+            yield diagnostic("weigh", f"{weight_log.log}.mass", "warning", text)
             continue
         if fault:
-            message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
-            yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
-        yield from estimate_mass(weighing, weight_loads, tare, others, robot, spread)
+            message = f"{weight_log.log}: its tare {weight_log.tare} {fault}, and is not subtracted"
+            yield diagnostic("weigh", f"{weight_log.log}.mass", "warning", f"{message}; record it along the same path")
+        yield from estimate_mass(weight_log, weight_loads, tare, others, robot, spread)
 
 
 def torque_constants(
-    weighing: Weighing,
+    weight_log: Weighing,
     loads: Sequence[Load],
     tare: Sequence[Load],
     others: Sequence[Load],
@@ -167,15 +144,15 @@ def torque_constants(
     No stage applies it.  A joint whose current shows the mass with a larger relative error than
     `MAX_RELATIVE_ERROR` is left out.
     """
-    for i, load in enumerate(loads if weighing.weight.mass else ()):
-        joint = robot.joint(load.joint)
-        same = [other for other in others if other.joint == load.joint and not tare]
-        parts = [tare[i] if tare else load, *filter(None, map(unseen_part, same))]
-        run, *free = (fit_mass(rows_of([part], {}, "load")) for part in parts)
-        run = run._replace(std=max(run.std, spread[load.joint]))
-        apparent = MassEstimate(run.mass, pooled_std(run, free))
+    for i, load in enumerate(loads if weight_log.weight.mass else ()):
         if not load.is_current:
             continue
+        joint = robot.joint(load.joint)
+        same = [other for other in others if other.joint == load.joint and not tare]
+        parts = [tare[i] if tare else load, *filter(None, map(paths.unseen_part, same))]
+        run, *free = (weighing.fit_mass(paths.rows_of([part], {}, "load")) for part in parts)
+        run = run._replace(std=max(run.std, spread[load.joint]))
+        apparent = MassEstimate(run.mass, weighing.pooled_std(run, free))
         if not apparent.std <= MAX_RELATIVE_ERROR * apparent.mass:
             text = (
                 f"{load.log}/{load.joint}: its current shows the known mass too imprecisely for a torque constant, as "
@@ -185,12 +162,12 @@ def torque_constants(
                 text = f"{load.log}/{load.joint}: the known mass appears negative, so it gives no torque constant"
             yield diagnostic("weigh", f"{load.log}.{load.joint}.torque-constant", "note", text)
             continue
-        assert weighing.weight.mass
-        scaled = scaled_constant(joint.torque_constant, weighing.weight.mass, apparent)
+        assert weight_log.weight.mass
+        scaled = weighing.scaled_constant(joint.torque_constant, weight_log.weight.mass, apparent)
         stated = float("nan") if joint.effort else joint.torque_constant
-        record = TorqueConstant(weighing.log, load.joint, weighing.weight.mass, stated, *scaled)
+        record = TorqueConstant(weight_log.log, load.joint, weight_log.weight.mass, stated, *scaled)
         yield record
-        subject = f"{weighing.log}.{load.joint}.torque-constant"
+        subject = f"{weight_log.log}.{load.joint}.torque-constant"
         yield diagnostic("weigh", subject, "note", proposal(record, joint.gear_ratio))
 
 
@@ -221,7 +198,7 @@ class FreeMotionErrors(NamedTuple):
 
 
 def estimate_mass(
-    weighing: Weighing,
+    weight_log: Weighing,
     loads: Sequence[Load],
     tare: Sequence[Load],
     others: Sequence[Load],
@@ -231,7 +208,7 @@ def estimate_mass(
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
     free = free_motion_errors(loads, others)
     loads = tare or loads
-    sides = [rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
+    sides = [paths.rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
     joints = [load.joint for load in loads]
     false = np.zeros(len(loads)) if tare else np.array([free.false_mass.get(joint, 0.0) for joint in joints])
     fit_std = 0.0 if tare else free.fit_std
@@ -240,41 +217,42 @@ def estimate_mass(
             MassEstimate(mass, float(np.hypot(max(std, spread[load.joint]), error)))
             for (mass, std), load, error in zip(masses, loads, false, strict=True)
         ]
-        for masses in ([fit_mass([row]) for row in side] for side in sides)
+        for masses in ([weighing.fit_mass([row]) for row in side] for side in sides)
     ]
-    test, mirrored_test = (agreement(masses) for masses in alone)
-    between = float(np.linalg.norm(shares(sides[0]) * [spread[joint] for joint in joints]))
-    (mass, run_std), (mass_mirrored, mirrored_run_std) = (fit_mass(rows) for rows in sides)
+    test, mirrored_test = (weighing.agreement(masses) for masses in alone)
+    between = float(np.linalg.norm(weighing.shares(sides[0]) * [spread[joint] for joint in joints]))
+    (mass, run_std), (mass_mirrored, mirrored_run_std) = (weighing.fit_mass(rows) for rows in sides)
     run_std, mirrored_run_std = max(run_std, between), max(mirrored_run_std, between)
     std = widen(free.widening * float(np.hypot(run_std, fit_std)), mass, alone[0], test)
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
-    stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
-    left = np.array([root_mean_square(residual(row, mass)) for row in sides[0]])
-    tare_mass = free.masses.get(weighing.tare if tare else "", MassEstimate(float("nan"), float("nan")))
+    stated = float("nan") if weight_log.weight.mass is None else weight_log.weight.mass
+    left = np.array([root_mean_square(weighing.residual(row, mass)) for row in sides[0]])
+    tare_mass = free.masses.get(weight_log.tare if tare else "", MassEstimate(float("nan"), float("nan")))
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
         yield diagnostic(
-            "weigh", f"{weighing.log}.joints", "warning", contradiction(weighing.log, joints, alone[0], test)
+            "weigh", f"{weight_log.log}.joints", "warning", contradiction(weight_log.log, joints, alone[0], test)
         )
     yield Weight(
-        log=weighing.log, moves_with=weighing.weight.moves_with, tare=weighing.tare if tare else "",
+        log=weight_log.log, moves_with=weight_log.weight.moves_with, tare=weight_log.tare if tare else "",
         stated_mass=stated, mass=mass, mass_std=std, run_std=run_std, fit_std=fit_std, widening=free.widening,
         agreement=test.probability, agreement_mirrored=mirrored_test.probability, birge_ratio=test.ratio,
         differing=differing, mass_mirrored=mass_mirrored,
         mass_mirrored_std=widen(mirrored_std, mass_mirrored, alone[1], mirrored_test),
-        side=side_of(better(*sides), mass_mirrored), mass_scale=mass / stated, mass_scale_std=std / stated,
+        side=side_of(weighing.better(*sides), mass_mirrored), mass_scale=mass / stated, mass_scale_std=std / stated,
         tare_mass=tare_mass.mass, tare_mass_std=total_std(tare_mass, free), loaded=np.array(joints, object),
         unit=np.array([robot.joint(joint).unit("{effort}") for joint in joints], object),
         mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
         mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
-        false_mass=false, joint_offset=np.array([offset(row, mass) if row.varies else np.nan for row in sides[0]]),
-        joint_offset_std=np.array([offset_std(row, MassEstimate(mass, std)) for row in sides[0]]),
+        false_mass=false,
+        joint_offset=np.array([weighing.offset(row, mass) if row.varies else np.nan for row in sides[0]]),
+        joint_offset_std=np.array([weighing.offset_std(row, MassEstimate(mass, std)) for row in sides[0]]),
         left_rms=left[:, 0], left_rms_std=left[:, 1],
         free_error=np.array([free.sigma[joint] for joint in joints]),
         free_error_std=np.array([free.sigma_std.get(joint, float("nan")) for joint in joints]),
     )  # fmt: skip
     for log, free_mass in free.masses.items():
-        yield FreeWeight(log, weighing.log, free.roles[log], free_mass.mass, total_std(free_mass, free))
+        yield FreeWeight(log, weight_log.log, free.roles[log], free_mass.mass, total_std(free_mass, free))
 
 
 def widen(std: float, mass: float, alone: Sequence[MassEstimate], test: Agreement) -> float:
@@ -322,28 +300,30 @@ def free_motion_errors(weight_loads: Sequence[Load], others: Sequence[Load]) -> 
     widens all errors.
     """
     joints = {load.joint for load in weight_loads}
-    unseen = list(filter(None, (unseen_part(load) for load in others if load.joint in joints)))
+    unseen = list(filter(None, (paths.unseen_part(load) for load in others if load.joint in joints)))
     by_log = by_name(unseen, "log")
-    by_joint = {joint: rows_of(ls, {}, "load") for joint, ls in by_name(unseen, "joint").items()}
-    sigma = {joint: model_errors(rows) for joint, rows in by_joint.items()}
+    by_joint = {joint: paths.rows_of(ls, {}, "load") for joint, ls in by_name(unseen, "joint").items()}
+    sigma = {joint: weighing.model_errors(rows) for joint, rows in by_joint.items()}
     sigma_std = {
-        joint: root_mean_square(np.concatenate([residual(row, 0.0) for row in rows]))[1]
+        joint: root_mean_square(np.concatenate([weighing.residual(row, 0.0) for row in rows]))[1]
         for joint, rows in by_joint.items()
     }
     for load in weight_loads:  # a joint without free motion gets the residual of its weight log
-        [row] = rows_of([load], {}, "load")
-        sigma.setdefault(load.joint, float(np.std(residual(row, fit_mass([row]).mass))))
+        [row] = paths.rows_of([load], {}, "load")
+        sigma.setdefault(load.joint, float(np.std(weighing.residual(row, weighing.fit_mass([row]).mass))))
     roles = {log: ls[0].role for log, ls in by_log.items()}
-    rows = {log: rows_of(ls, sigma, "load") for log, ls in by_log.items()}
-    masses = {log: fit_mass(log_rows) for log, log_rows in rows.items()}
+    rows = {log: paths.rows_of(ls, sigma, "load") for log, ls in by_log.items()}
+    masses = {log: weighing.fit_mass(log_rows) for log, log_rows in rows.items()}
     fitted = [row for log, log_rows in rows.items() if roles[log] == "identification" for row in log_rows]
-    of_fitted = fit_mass(fitted) if fitted else MassEstimate(0.0, 0.0)
+    of_fitted = weighing.fit_mass(fitted) if fitted else MassEstimate(0.0, 0.0)
     false_mass = {
-        joint: float(np.sqrt(np.mean([np.max(np.square(fit_mass([row]))) for row in joint_rows])))
+        joint: float(np.sqrt(np.mean([np.max(np.square(weighing.fit_mass([row]))) for row in joint_rows])))
         for joint, joint_rows in by_joint.items()
     }
-    weight_shares = shares(rows_of(weight_loads, sigma, "load"))
+    weight_shares = weighing.shares(paths.rows_of(weight_loads, sigma, "load"))
     by_shares = np.linalg.norm(weight_shares * [false_mass.get(load.joint, 0.0) for load in weight_loads])
     fit_std = max(abs(of_fitted.mass), of_fitted.std, float(by_shares))
     validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
-    return FreeMotionErrors(sigma, sigma_std, fit_std, false_mass, widening_factor(validation, fit_std), masses, roles)
+    return FreeMotionErrors(
+        sigma, sigma_std, fit_std, false_mass, weighing.widening_factor(validation, fit_std), masses, roles
+    )

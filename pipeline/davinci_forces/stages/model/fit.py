@@ -9,15 +9,8 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regression, Search, standard_errors
+from davinci_forces.identification import identifiability
 from davinci_forces.identification.candidates import Library, variants, with_every_term
-from davinci_forces.identification.identifiability import (
-    advice,
-    describe_correlated,
-    describe_insignificant,
-    hardly_described,
-    moving_with,
-    why_not_positive,
-)
 from davinci_forces.identification.model_error import model_std
 from davinci_forces.identification.observations import CellEquations, Observed, block_equations, observe, pose_samples
 from davinci_forces.identification.regression import join_regressions, known_of, parameter_columns, pose
@@ -58,7 +51,7 @@ class Part(NamedTuple):
     rate: float
     periods: int
     period: float  # [s]; the duration of a motion without a period
-    noise: tuple[float, float, float]  # standard deviations of q, dq and tau
+    noise: tuple[float, float, float]  # std of q, dq and tau between periods, or of what the low-pass removes
     t: Column
     q: Column
     dq: Column
@@ -92,7 +85,7 @@ def run(
         parts = [periodic_part(model, t, prior) for t in averaged if t.joint == joint.name]
         parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
-            others = moving_with(joint.name, [part.log for part in parts], moving)
+            others = identifiability.moving_with(joint.name, [part.log for part in parts], moving)
             shares = [largest_omitted(s.amplitude, s.harmonics)[1] for s in all_spectra if s.joint == joint.name]
             yield from fit_joint(model, parts, robot, others, max(shares, default=0.0), lowpass)
 
@@ -136,16 +129,18 @@ def fit_joint(
             continue
         estimates[name] = estimate
         yield fit_record(parts, model, name, regression, estimate, lowpass)
-        yield from residuals(parts, model, name, estimate)
+        for part in parts:  # (6.54)
+            tau_hat, tau = part.regression.Phi @ estimate.theta, part.regression.tau
+            yield Residual(part.log, model.group, model.name, name, part.rate, part.t, part.dq, tau, tau_hat)
         yield from (swarm_search(model, name, search, regression) for search in estimate.run_searches())
-    yield from identifiability(model, regression, estimates, robot, others, omitted)
+    yield from assess_identifiability(model, regression, estimates, robot, others, omitted)
     yield from cost_of_consistency(model.group, regression, estimates, robot.joint(model.group).unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
     yield from guesses(model, regression)
     yield from fitted_paths(model.group, parts)
-    yield noise(model.group, parts)
+    yield MeasurementNoise(model.group, *np.sqrt(np.mean([np.square(part.noise) for part in parts], axis=0)).tolist())
 
 
 def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, regression: Regression) -> Array | float:
@@ -164,7 +159,7 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
         return 0.0
 
 
-def identifiability(
+def assess_identifiability(
     model: IndependentJoint,
     regression: Regression,
     estimates: dict[str, Estimate],
@@ -178,14 +173,15 @@ def identifiability(
         return
     joint, excitation = robot.joint(model.group), analyse_columns(regression.triangle)
     names = parameter_columns(model)["parameter"]
-    pairs, insignificant = describe_correlated(names.tolist(), excitation), describe_insignificant(regression, plain)
+    pairs = identifiability.describe_correlated(names.tolist(), excitation)
+    insignificant = identifiability.describe_insignificant(regression, plain)
     yield Identifiability(
         group=model.group,
         model=model.name,
         scaled_condition=excitation.condition,
         together=tuple(pairs),
         not_seen=tuple(insignificant),
-        advice=advice(robot, joint, (*pairs, *insignificant)),
+        advice=identifiability.advice(robot, joint, (*pairs, *insignificant)),
         parameter=np.repeat(names, len(names)),
         beside=np.tile(names, len(names)),
         correlation=excitation.correlation.ravel(),
@@ -194,10 +190,10 @@ def identifiability(
     if wrong:
         estimate = plain if "lse" in wrong else estimates[wrong[0]]
         verb = "estimates" if len(wrong) == 1 else "estimate"
-        why = why_not_positive(robot, joint, estimate, excitation, others)
+        why = identifiability.why_not_positive(robot, joint, estimate, excitation, others)
         message = f"{model.group}: {join_names(wrong)} {verb} an inertia that is not positive: {why}"
         yield diagnostic("fit", model.group, "note", message)  # `predict` warns if this model is used
-    if message := hardly_described(joint, r_squared(regression, plain), others, omitted):
+    if message := identifiability.hardly_described(joint, r_squared(regression, plain), others, omitted):
         severity = "note" if others else "warning"  # with others, a model of the whole arm may be used
         yield diagnostic("fit", model.group, severity, f"{model.group}: {message}")
 
@@ -354,16 +350,3 @@ def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Di
         t=np.concatenate([part.t for part in parts]),
         q=np.concatenate([part.q for part in parts]),
     )
-
-
-def noise(joint: str, parts: Sequence[Part]) -> MeasurementNoise:
-    """Noise of a joint over all logs: standard deviations between periods, or of the part that the low-pass removes."""
-    sigma_q, sigma_dq, sigma_tau = np.sqrt(np.mean([np.square(part.noise) for part in parts], axis=0)).tolist()
-    return MeasurementNoise(joint, sigma_q, sigma_dq, sigma_tau)
-
-
-def residuals(parts: Sequence[Part], model: IndependentJoint, name: str, estimate: Estimate) -> Iterator[Residual]:
-    """Residual effort of a fit along each log.  (6.54)"""
-    for part in parts:
-        tau_hat, tau = part.regression.Phi @ estimate.theta, part.regression.tau
-        yield Residual(part.log, model.group, model.name, name, part.rate, part.t, part.dq, tau, tau_hat)
