@@ -71,7 +71,7 @@ def test_repeated_rows_are_flagged_from_a_tenth_on(tmp_path: Path) -> None:
         path.write_text("t,q\n" + "".join(f"{a!r},{b!r}\n" for a, b in zip(t.tolist(), q.tolist(), strict=True)))
         found = json.loads(shown(path, "--json"))
         assert found["clock"]["duplicates"] == repeated
-        assert any("repeat the previous row" in warning for warning in found["warnings"]) is flagged
+        assert any("repeat the one before" in warning for warning in found["warnings"]) is flagged
 
 
 def test_a_jittery_clock_and_a_gap_are_flagged_and_an_even_one_is_not(tmp_path: Path) -> None:
@@ -79,8 +79,8 @@ def test_a_jittery_clock_and_a_gap_are_flagged_and_an_even_one_is_not(tmp_path: 
     even = np.arange(500) * 0.01
     jittery = even + rng.uniform(0, 0.005, 500)
     gapped = np.where(even > 2, even + 0.1, even)
-    longest = "the longest gap between samples is 0.11 s"
-    for name, t, words in (("even", even, ""), ("jittery", jittery, "of jitter"), ("gapped", gapped, longest)):
+    longest = "the longest time between samples is 0.11 s"
+    for name, t, words in (("even", even, ""), ("jittery", jittery, "varies by"), ("gapped", gapped, longest)):
         path = tmp_path / f"{name}.csv"
         path.write_text("t,q\n" + "".join(f"{a:.6f},{b}\n" for b, a in enumerate(t.tolist())))
         warnings = json.loads(shown(path, "--json"))["warnings"]

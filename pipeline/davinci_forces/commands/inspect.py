@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from davinci_forces.maths.signals.columns import Outline
 
 BARS = "▁▂▃▄▅▆▇█"
-MAX_REPEATED_OR_JITTER = 0.1  # share of rows, and of the sampling time, above which a warning is given
 
 
 def run(
@@ -148,23 +147,16 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
 
 
 def _flags(source: str, survey: _Survey) -> Iterator[str]:
-    """Warnings about a clock: repeated rows, times that do not increase, jitter and gaps."""
-    clock, rate = survey.statistics, survey.rate
-    if clock.duplicates > MAX_REPEATED_OR_JITTER * clock.samples:
-        share = clock.duplicates / clock.samples
-        yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the previous row in every channel"
-    if not source:
-        return
-    if clock.backward or clock.repeated:
+    """Warnings about a clock: times that do not increase, repeated rows, jitter and gaps."""
+    from davinci_forces.maths.signals import clock as clocks
+
+    clock = survey.statistics
+    if source and (clock.backward or clock.repeated):
         yield (
             f"time {source!r} goes back {clock.backward} times and repeats {clock.repeated} times, first in row "
             f"{clock.bad_row + 1}; name another time channel, or add rate = ... [Hz] for this log in study.toml"
         )
-    elif clock.jitter * rate > MAX_REPEATED_OR_JITTER:
-        yield f"the clock has {clock.jitter * 1e3:.3g} ms of jitter (std) in intervals of {1e3 / rate:.3g} ms"
-    if clock.longest_gap * rate > 2.5:
-        gap = clock.longest_gap
-        yield f"the longest gap between samples is {gap:.3g} s, {gap * rate:.1f} sampling intervals"
+    yield from clocks.remarks(clock, survey.rate)
 
 
 def _plain(value: float) -> float | None:

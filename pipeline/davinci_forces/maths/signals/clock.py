@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -18,6 +18,7 @@ FILLED = 0.02  # [s] longest time without samples that is interpolated: a third 
 ALIKE = 0.25  # of an interval: largest difference to the next one in an even stretch
 MIN_INTERVALS_EVEN = 10  # an even stretch at another rate has at least so many intervals
 MAX_PERIOD_RATIO = 10.0  # a sampling time over the usual one; slower samples are not interpolated
+MAX_REPEATED, MAX_JITTER = 0.1, 0.1  # share of rows, and of the sampling time, above which a remark says so
 MIN_SHARE_RHYTHM = 0.9  # of the times without samples, in a column that is sampled in a rhythm of its own
 TIME_ROUNDING = 1e-6  # relative, of times
 
@@ -84,6 +85,19 @@ class ClockStatistics:
         """Standard deviation of the time between samples [s]; 0 if rounding of the times explains the deviation."""
         std = math.sqrt(self._squares / (self.samples - 2)) if self.samples > 2 else 0.0
         return std if std > 1e-9 * abs(self._mean) else 0.0
+
+
+def remarks(clock: ClockStatistics, rate: float) -> Iterator[str]:
+    """State that many rows repeat, and that the time between samples varies or is long, for a clock of `rate` [Hz]."""
+    if clock.duplicates > MAX_REPEATED * clock.samples:
+        yield (
+            f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
+            "before in every channel used: the recorder ran faster than the robot's measurements"
+        )
+    if clock.jitter * rate > MAX_JITTER:
+        yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / rate:.3g} ms"
+    if clock.longest_gap * rate > GAP:
+        yield f"the longest time between samples is {clock.longest_gap:.3g} s, {clock.longest_gap * rate:.1f} samples"
 
 
 def interruptions(t: Array) -> tuple[int, float]:

@@ -6,12 +6,10 @@ import numpy as np
 
 from davinci_forces.files import visible
 from davinci_forces.logs.log import UNSET_START
+from davinci_forces.maths.signals import clock as clocks
 from davinci_forces.maths.signals.clock import FILLED, GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
-
-MOST_REPEATED = 0.1  # share of rows equal to the previous row; above it, the recorder was faster than the robot
-MOST_JITTER = 0.1  # of the sampling time
 
 
 def summary(intake: Intake) -> LogSummary:
@@ -78,13 +76,4 @@ def remarks(intake: Intake) -> Iterator[str]:
             f"samples are missing ({lacking}): {missing.filled_rows} rows with up to {1e3 * FILLED:g} ms or one sample "
             f"missing are filled by cubics, and neither fitted nor judged; {missing.left_out - end} rows are gaps"
         )
-    if clock.duplicates > MOST_REPEATED * clock.samples:
-        yield (
-            f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
-            "before in every channel used: the recorder ran faster than the robot's measurements"
-        )
-    if clock.jitter * clock.rate > MOST_JITTER:
-        yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
-    if clock.longest_gap * clock.rate > GAP:
-        gap = clock.longest_gap
-        yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"
+    yield from clocks.remarks(clock, clock.rate)
