@@ -391,14 +391,16 @@ def test_where_least_squares_are_not_possible_no_error_is_due_to_the_model(monke
         np.testing.assert_array_equal(std, stds[1][name], err_msg=name)
 
 
-def test_a_guess_states_its_error_with_its_standard_error():
+def test_a_guess_states_its_error_in_motion_with_its_standard_error():
     rng = np.random.default_rng(4)
     Phi, guess = rng.normal(size=(400, 2)), np.array([1.0, -2.0])
     tau = Phi @ guess + rng.normal(size=400)
-    regression = SimpleNamespace(Phi=Phi, tau=tau, known=SimpleNamespace(guess=guess))
+    periods = np.repeat([4, 0], [360, 40])
+    tau[periods == 0] += 100.0  # at standstill, which no fit counts either, friction is unknown
+    regression = SimpleNamespace(Phi=Phi, tau=tau, periods=periods, known=SimpleNamespace(guess=guess))
     parameters = [Parameter(name, "", "N m", positive=False) for name in "ab"]
     [made] = fit.guesses(SimpleNamespace(group="roll", parameters=parameters), regression)
     assert made.mse == pytest.approx(1.0, abs=0.2)
-    assert made.mse_std == pytest.approx(np.sqrt(2.0 / 400), rel=0.3)  # of squares of normal values
+    assert made.mse_std == pytest.approx(np.sqrt(2.0 / 360), rel=0.3)  # of squares of normal values
     [none] = [*fit.guesses(None, SimpleNamespace(known=SimpleNamespace(guess=None)))] or [None]
     assert none is None

@@ -208,17 +208,15 @@ def cost_of_consistency(
     wrong = [name for name, x, is_signed in zip(regression.names, estimates["lse"].theta, signs, strict=True)
              if is_signed and x < 0]  # fmt: skip
     if wrong:
-        rmse, before = (
-            np.sqrt(np.mean((regression.tau - regression.Phi @ estimates[name].theta) ** 2))
-            for name in ("consistent", "lse")
-        )
+        pair = (fit_residual(regression, estimates[name].theta) for name in ("consistent", "lse"))
+        rmse, before = (np.sqrt(np.mean(residual**2)) for residual in pair)
         message = f"{group}: lse estimates a negative {join_names(wrong)}, which no mechanism has"
         cost = f"{rmse:.3g} {unit} root mean square instead of {before:.3g} {unit}"
         yield diagnostic("fit", group, "note", f"{message}; consistent has none, and leaves an effort of {cost}")
 
 
 def fit_residual(regression: Regression, theta: Array) -> Array:
-    """Residual effort of parameters (p,) on the data of a fit."""
+    """Residual effort of parameters (p,) on the data of a fit, without standstill."""
     return np.asarray((regression.tau - regression.Phi @ theta)[regression.periods > 0])
 
 
@@ -285,7 +283,7 @@ def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
     theta = regression.known.guess
     if theta is None:
         return
-    squares = (regression.tau - regression.Phi @ theta) ** 2
+    squares = fit_residual(regression, theta) ** 2
     mse, mse_std = float(np.mean(squares)), error_of_pooled_mean(squares)
     columns = parameter_columns(model)
     yield Guess(model.group, mse, mse_std, columns["parameter"], columns["unit"], theta)
