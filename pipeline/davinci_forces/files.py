@@ -10,6 +10,7 @@ import shutil
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from io import BufferedReader, BytesIO, TextIOWrapper
+from math import isfinite
 from pathlib import Path
 from uuid import uuid4
 
@@ -147,6 +148,11 @@ def visible(text: str, keep: str = "") -> str:
         return match[0] if match[0] in keep else f"\\x{code:02x}" if code < 32 else f"\\u{code:04x}"
 
     return CONTROL.sub(escape, text)
+
+
+def json_number(value: float) -> float | None:
+    """Return the number, or None for NaN and infinity, which JSON does not have."""
+    return value if isfinite(value) else None
 
 
 def leftovers(folder: Path) -> Iterator[Path]:

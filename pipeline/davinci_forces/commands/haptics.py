@@ -1,7 +1,6 @@
 """Simulate haptic feedback through arm, controller and filter from a scenario: felt forces and stability margins."""
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +8,7 @@ from typer import Argument, Option
 
 from davinci_forces.commands import AsJson
 from davinci_forces.errors import BadRequest
-from davinci_forces.files import write_bytes
+from davinci_forces.files import json_number, write_bytes
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
         hands[name] = {
             "m": hand.m, "b_h": hand.b, "k_h": hand.k, "true_peak": run.true_peak, "felt_peak": run.felt_peak,
             "felt_error": run.felt_error, "out_of_reach": float(run.t[-1]) if run.out_of_reach else None,
-            **{key: None if math.isnan(value) else value for key, value in numbers.items()},
+            **{key: json_number(value) for key, value in numbers.items()},
         }  # fmt: skip
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from davinci_forces.files import visible
+from davinci_forces.files import json_number, visible
 from davinci_forces.runner.console import echo, table
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
         "warnings": [*warnings, *_flags(source, main)],
-        "head": {name: [_plain(value) for value in first[name]] for name in names},
+        "head": {name: [json_number(value) for value in first[name]] for name in names},
     }  # fmt: skip
 
 
@@ -130,9 +130,10 @@ def _clock(log: "Log", source: str, survey: _Survey) -> dict[str, Any]:
         return {"source": f"{advice}, or {hint}" if hint else advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
-        "rate": _plain(survey.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
-        "duration": _plain(clock.last - clock.first), "backward": clock.backward, "repeated": clock.repeated,
-        "duplicates": clock.duplicates, "interruptions": survey.unusual,
+        "rate": json_number(survey.rate), "jitter": json_number(clock.jitter),
+        "longest_gap": json_number(clock.longest_gap), "duration": json_number(clock.last - clock.first),
+        "backward": clock.backward, "repeated": clock.repeated, "duplicates": clock.duplicates,
+        "interruptions": survey.unusual,
     }  # fmt: skip
 
 
@@ -141,9 +142,9 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
     labels |= {"alias": channel.alias} if channel.alias else {}
     if outline is None:
         return labels
-    values = {name: _plain(getattr(outline, name)) for name in ("samples", "least", "most", "mean")}
+    values = {name: json_number(getattr(outline, name)) for name in ("samples", "least", "most", "mean")}
     counts = {"nulls": log.nulls.get(channel.name, 0), "nans": log.nans.get(channel.name, 0)}
-    return labels | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
+    return labels | values | counts | {"course": [json_number(value) for value in outline.course.tolist()]}
 
 
 def _flags(source: str, survey: _Survey) -> Iterator[str]:
@@ -157,11 +158,6 @@ def _flags(source: str, survey: _Survey) -> Iterator[str]:
             f"{clock.bad_row + 1}; name another time channel, or add rate = ... [Hz] for this log in study.toml"
         )
     yield from clocks.remarks(clock, survey.rate)
-
-
-def _plain(value: float) -> float | None:
-    """The value, or None for NaN and infinity, which JSON does not have."""
-    return value if abs(value) < float("inf") else None
 
 
 def lines(description: dict[str, Any]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typer import Argument, Option
 
 from davinci_forces.commands import AsJson
 from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.files import json_number
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
@@ -114,16 +115,13 @@ def _joints(robot: "Robot") -> dict[str, Any]:
     """Kind, unit of effort, limits (null where there is none) and terms of each joint."""
     joints = {}
     for joint in robot.joints:
-        limits = {symbol: [*map(_finite, getattr(joint.limits, symbol))] for symbol in ("q", "dq", "ddq")}
+        limits = {symbol: [*map(json_number, getattr(joint.limits, symbol))] for symbol in ("q", "dq", "ddq")}
         joints[joint.name] = {
             "kind": joint.kind.value, "effort": joint.unit("{effort}"),
-            "limits": limits | {"effort": _finite(joint.limits.effort)}, "terms": [term.name for term in joint.terms],
+            "limits": limits | {"effort": json_number(joint.limits.effort)},
+            "terms": [term.name for term in joint.terms],
         }  # fmt: skip
     return joints
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:

@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.files import visible
+from davinci_forces.files import json_number, visible
 from davinci_forces.filters import DEFAULT
 from davinci_forces.filters.error_bands import free_errors
 from davinci_forces.filters.response import noise_model, ramp_lag
@@ -165,7 +164,7 @@ def _chain(chain: Chain) -> dict[str, Any]:
 
 
 def _model(fit: Fit, model: Model) -> dict[str, Any]:
-    stds = (x if isfinite(x) else None for x in fit.theta_std.tolist())
+    stds = map(json_number, fit.theta_std.tolist())
     rows = zip(fit.parameter, fit.theta.tolist(), stds, fit.unit, strict=True)
     parameters = [
         {"name": str(name), "joint": about.joint or None, "value": value, "std": std, "unit": str(unit)}
@@ -189,9 +188,8 @@ def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
     i, units = joint.model.efforts.index(joint.name), {name: joint.joint.unit(unit) for name, unit in UNITS.items()}
     motion = {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]}
     bounds = {name: getattr(joint.joint.limits, symbol) for name, symbol in (("position", "q"), ("velocity", "dq"))}
-    limits = {name: [x if isfinite(x) else None for x in ends] for name, ends in bounds.items()}
-    effort = joint.joint.limits.effort
-    limits["effort"] = [-effort, effort] if isfinite(effort) else [None, None]
+    limits = {name: [*map(json_number, ends)] for name, ends in bounds.items()}
+    limits["effort"] = [json_number(sign * joint.joint.limits.effort) for sign in (-1.0, 1.0)]
     return {
         "name": joint.name, "kind": joint.joint.kind.value, "verdict": verdict, "model": ".".join(joint.fit.key),
         "units": units, "motion": motion, "limits": limits, "validity": joint.validity, "filter": joint.filter,

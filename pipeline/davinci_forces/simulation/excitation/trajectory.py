@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadRequest
+from davinci_forces.files import json_number
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem
@@ -77,13 +78,13 @@ class ExcitationTrajectory:
         return {
             "joint": self.joint.name,
             "criterion": self.problem.criterion,
-            "objective": finite(self.objective),
-            "condition": finite(self.condition),
+            "objective": json_number(self.objective),
+            "condition": json_number(self.condition),
             "coefficients": dict(zip(names, self.series.x.tolist(), strict=True)),
             "period": self.series.period,
             "samples": self.problem.samples,
             "ranges": {s: list(r) for s, r in zip(symbols, fourier.ranges(self.series), strict=True)},
-            "limits": {s: [finite(x) for x in r] for s, r in zip(symbols, self.problem.limits, strict=True)},
+            "limits": {s: [json_number(x) for x in r] for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.violations,
             **({"starts": spread(self.optima)} if self.optima else {}),
             **as_facts(self.standard_errors),
@@ -95,24 +96,19 @@ class ExcitationTrajectory:
 
 def as_facts(standard_errors: Sequence[ExpectedParameter]) -> dict[str, Any]:
     """Expected standard errors in JSON's types; nothing without noise."""
-    stated = {p.name: {"std": finite(p.std), "unit": p.unit} for p in standard_errors}
+    stated = {p.name: {"std": json_number(p.std), "unit": p.unit} for p in standard_errors}
     return {"standard_errors": stated} if stated else {}
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
     """The agreement of a search's starts: their number, and the best, median and worst optimum."""
-    ordered = [finite(value) for value in sorted(optima)]
+    ordered = [json_number(value) for value in sorted(optima)]
     best, median, worst = ordered[0], ordered[(len(ordered) - 1) // 2], ordered[-1]
     return {"number": len(optima), "best": best, "median": median, "worst": worst}
 
 
-def finite(value: float) -> float | None:
-    """The number, or None for JSON's null if it is infinite because the trajectory does not separate the terms."""
-    return value if math.isfinite(value) else None
-
-
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
-    """Plot position, velocity and acceleration of a period, with limits; raises BadRequest unless in PLOTS.  Fig 6.5"""
+    """Plot position, velocity and acceleration of a period, with limits; raises BadRequest for a suffix not in PLOTS.  Fig 6.5"""
     if path.suffix not in PLOTS:
         raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
     import matplotlib as mpl
