@@ -52,7 +52,10 @@ def run(
     del estimate
     smoothed, own = filter_parts(SMOOTHER, parts, filter_noise, ("tau_ext", "tau_ext_std"))[2:4]
     late = lag_error(parts, smoothed, filter_noise)
-    variance, variance_std, source = variance_of(model, band, own, bool(entry.free))
+    variance, variance_std, source = own**2, 0.0, ""
+    if band is not None:
+        variance, std, source = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
+        variance_std = float(np.mean(std))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
     smooth_rise = rise(tracker(SMOOTHER), parts[0], filter_noise)
     rounding = np.concatenate([
@@ -101,14 +104,6 @@ def numbers_of(estimate: Tracked, offset: DayOffset, converged: Booleans, free: 
         "nis_mean_std": error_of_pooled_mean(nis),
         "filter_part": rms(estimate.tau_ext_std[converged]),
     }
-
-
-def variance_of(model: JointModel, band: ErrorBand | None, own: Array, is_centred: bool) -> tuple[Array, float, str]:
-    """The variance (N,) of the smoothed effort, the mean of its standard error, and their source; `total_variance`."""
-    if band is None:
-        return own**2, 0.0, ""
-    variance, std, source = total_variance(band, model.log, model.path, model.dq, own, is_centred)
-    return variance, float(np.mean(std)), source
 
 
 def rms(x: Array) -> float:

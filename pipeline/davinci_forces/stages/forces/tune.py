@@ -58,16 +58,11 @@ def gather(tunings: Iterable[Tuning], *, delay: float) -> Iterator[FilterNoise]:
     for joint, ts in by_name(tunings, "joint").items():
         medians = {name: float(np.median([getattr(t, name) for t in ts])) for name in POOLED}
         inertia, trials = max(t.inertia for t in ts), np.array(TRIAL_DELAYS)
-        std = np.array([std_with_delay(inertia, medians, trial) for trial in TRIAL_DELAYS])
+        T_s, viscous = 1.0 / medians["rate"], medians["viscous"]
+        noise = NoiseModel(medians["r_q"], medians["r_dq"], 0.0, medians["r_tau"] * T_s / inertia, 0.0)
+        walks = (smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, trial) for trial in TRIAL_DELAYS)
+        std = np.array([steady_std(inertia, viscous, T_s, noise._replace(q_tau=walk)) for walk in walks])
         logs = tuple(t.log for t in ts)
         yield FilterNoise(
             joint=joint, logs=logs, delay=delay, inertia=inertia, trial_delay=trials, trial_std=std, **medians
         )
-
-
-def std_with_delay(inertia: float, medians: dict[str, float], delay: float) -> float:
-    """Standard deviation of the external effort by a filter that shows a push within `delay` [s]."""
-    T_s, viscous = 1.0 / medians["rate"], medians["viscous"]
-    noise = NoiseModel(medians["r_q"], medians["r_dq"], 0.0, medians["r_tau"] * T_s / inertia, 0.0)
-    walk = smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay)
-    return steady_std(inertia, viscous, T_s, noise._replace(q_tau=walk))

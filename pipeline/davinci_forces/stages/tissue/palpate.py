@@ -100,18 +100,10 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> p
     if touch is not None:
         nearest = np.clip(np.searchsorted(touch.t, slide.t), 0, len(touch) - 1)
         push, place = touch.push[nearest], place_of(touch)[nearest]
-    return palpation.known_samples(
-        palpation.Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide))
-    )
-
-
-def model_std(slide: Track) -> Column:
-    """Standard deviation (N,) of the error that pushes may share: that of the model, or where unknown, the total.
-
-    The residual of a line contains the noise.  Its intercept contains the constant effort offset that differs
-    from day to day.  There is no lag.
-    """
-    return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_smooth_std
+    # The error that pushes may share is that of the model, or where unknown, the total: the residual of a line contains
+    # the noise, its intercept the constant effort offset that differs from day to day, and there is no lag.
+    std = np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_smooth_std
+    return palpation.known_samples(palpation.Probing(slide.t, push, depth, direct[:, None], place, dq, std))
 
 
 def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:
