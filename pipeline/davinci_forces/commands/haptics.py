@@ -12,7 +12,7 @@ from davinci_forces.files import json_number, write_bytes
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
-    from davinci_forces.haptics.scenario import HapticScenario
+    from davinci_forces.haptics.scenario import FullScenario
     from davinci_forces.records import HapticRun
 
 Answer = dict[str, Any]
@@ -51,7 +51,7 @@ def _write_template(file: Path) -> None:
     echo(f"{file}: written; change its numbers, then run `davinci-forces haptics {file}`")
 
 
-def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
+def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     """Results of a scenario as JSON values; None stands for no limit."""
     from davinci_forces.haptics import limits
     from davinci_forces.haptics import loop as haptic

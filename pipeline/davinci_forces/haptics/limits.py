@@ -18,7 +18,7 @@ from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles
 from davinci_forces.haptics.maths import delay as delays
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import Complex
-from davinci_forces.haptics.scenario import SLIDE, Body, HapticScenario
+from davinci_forces.haptics.scenario import Body, FullScenario
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HandLimit
 
@@ -32,11 +32,11 @@ Recording = tuple[Array, Array, Array]
 LoopResponse = tuple[Array, Complex, Complex]
 
 
-def without_friction(scenario: HapticScenario, body: Body | None = None) -> HapticScenario:
+def without_friction(scenario: FullScenario, body: Body | None = None) -> FullScenario:
     """The linear scenario: elastic tissue, no friction, also in the filter, no encoder steps; or with another body."""
     moved, assumed = (
         x._replace(coulomb=(0.0, 0.0), static=(0.0, 0.0), bristle_stiffness=0.0, bristle_damping=0.0)
-        for x in (body or scenario.body or SLIDE, scenario.assumed_body or scenario.body or SLIDE)
+        for x in (body or scenario.body, scenario.assumed_body)
     )
     return replace(
         scenario, body=moved, assumed_body=assumed, damping=0.0, friction=0.0, motor=scenario.motor._replace(
@@ -44,15 +44,14 @@ def without_friction(scenario: HapticScenario, body: Body | None = None) -> Hapt
     )  # fmt: skip
 
 
-def gain_and_impedance(scenario: HapticScenario, frequency: float) -> tuple[complex, complex]:
+def gain_and_impedance(scenario: FullScenario, frequency: float) -> tuple[complex, complex]:
     """G and Z [N/m] at a frequency [Hz], from simulations with and without the tissue."""
-    assert scenario.stiffness is not None
     gain = scenario.device.force * scenario.device.motion
     Z = NO_TISSUE * felt_share(replace(scenario, stiffness=NO_TISSUE), frequency)
     return gain * (felt_share(scenario, frequency) - Z / scenario.stiffness), gain * Z
 
 
-def loop_response(scenario: HapticScenario) -> LoopResponse:
+def loop_response(scenario: FullScenario) -> LoopResponse:
     """The response of the loop without friction; it is the same for every hand."""
     G, Z = np.array([gain_and_impedance(without_friction(scenario), f) for f in FREQUENCIES.tolist()]).T
     return 2.0 * np.pi * FREQUENCIES, G, Z
@@ -80,14 +79,13 @@ def filter_response(recordings: Sequence[Recording], frequency: float) -> tuple[
 
 
 def limits_of(
-    scenario: HapticScenario, name: str, hand: Hand, loop: LoopResponse, recordings: Sequence[Recording] = (),
+    scenario: FullScenario, name: str, hand: Hand, loop: LoopResponse, recordings: Sequence[Recording] = (),
     bodies: Sequence[Body] = (),
 ) -> HandLimit:  # fmt: skip
     """Compute the limits of a hand, with the filter measured in recordings of a joint, or else as the scenario has it.
 
     `bodies` are the arm's with one parameter changed by its standard error.
     """
-    assert scenario.stiffness is not None
     linear, tissue = without_friction(scenario), scenario.stiffness
     by_response, w = delays.response_limit(hand, *loop)
     changed = [without_friction(scenario, body) for body in bodies]
@@ -115,14 +113,14 @@ def limits_of(
     )  # fmt: skip
 
 
-def max_settling(scenario: HapticScenario, hand: Hand, guess: float) -> float:
+def max_settling(scenario: FullScenario, hand: Hand, guess: float) -> float:
     """The stiffest tissue [N/m] against which the hand settles, searched from a guess or from the scenario's tissue."""
-    start = guess if math.isfinite(guess) else scenario.stiffness or math.nan
+    start = guess if math.isfinite(guess) else scenario.stiffness
     return delays.max_stable(lambda k_t: hand_settles(replace(scenario, stiffness=k_t), hand), start)
 
 
 def measured_limit(
-    linear: HapticScenario, hand: Hand, w: float, recordings: Sequence[Recording], changed: Sequence[HapticScenario]
+    linear: FullScenario, hand: Hand, w: float, recordings: Sequence[Recording], changed: Sequence[FullScenario]
 ) -> dict[str, Any]:
     """The fields of `HandLimit` that follow from the formula and the filter: the limit, its error, and their reasons.
 

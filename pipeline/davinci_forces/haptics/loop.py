@@ -5,7 +5,7 @@ The filter in the loop is the filter that tracks the logs; it takes one sample a
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
 from davinci_forces.haptics.maths.delay import Complex, harmonic, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
-from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
+from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, FullScenario, HapticScenario
 from davinci_forces.maths.arrays import Array, records
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.models.terms import Coefficients
@@ -55,16 +55,16 @@ class FeltResponse(NamedTuple):
 def complete_scenario(
     scenario: HapticScenario, body: Body = SLIDE, noise: AxisNoise = SLIDE_NOISE, stiffness: float = THESIS_TISSUE,
     q_tau: float = 0.0, delay: float = PUSH_DELAY,
-) -> HapticScenario:  # fmt: skip
+) -> FullScenario:  # fmt: skip
     """Fill the fields that the scenario leaves open; the filter then assumes the true body."""
-    body = scenario.body or body
-    return replace(
-        scenario, body=body, assumed_body=scenario.assumed_body or body, noise=scenario.noise or noise,
-        stiffness=scenario.stiffness or stiffness, q_tau=scenario.q_tau or q_tau, filter_delay=delay,
-    )  # fmt: skip
+    body, stated = scenario.body or body, {f.name: getattr(scenario, f.name) for f in fields(scenario)}
+    return FullScenario(**stated | {
+        "body": body, "assumed_body": scenario.assumed_body or body, "noise": scenario.noise or noise,
+        "stiffness": scenario.stiffness or stiffness, "q_tau": scenario.q_tau or q_tau, "filter_delay": delay,
+    })  # fmt: skip
 
 
-def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
+def simulate_plan(scenario: FullScenario, hand: Hand) -> LoopRun:
     """Simulate the scenario's plan, with noise from its seed."""
     ticks = round(scenario.duration / scenario.tick)
     t = scenario.tick * np.arange(ticks, dtype=float) + scenario.plan[0][0]
@@ -73,12 +73,11 @@ def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
     reference = path.position(t + 0.5 * scenario.tick)
     speed = (path.position(t + scenario.tick) - path.position(t)) / scenario.tick
     random = np.random.default_rng(scenario.seed)
-    _, noise_of = _parts(scenario)
-    noise = random.normal(size=(_turns(scenario, ticks), 3)) * np.array(noise_of)
+    noise = random.normal(size=(_turns(scenario, ticks), 3)) * np.array(scenario.noise)
     return _run(scenario, hand, hand.k * reference + hand.b * speed, noise, start)
 
 
-def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
+def hand_settles(scenario: FullScenario, hand: Hand) -> bool:
     """Whether a hand pressed into the tissue settles after a sudden release; simulated without noise or stops."""
     ticks = round((RELEASE_TIME + SETTLING_PERIODS * 2.0 * math.pi / hand.frequency) / scenario.tick)
     t = np.arange(ticks) * scenario.tick
@@ -88,18 +87,17 @@ def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
     run = _run(endless, hand, push, np.zeros((_turns(scenario, ticks), 3)), 0.0)
     gain, x = scenario.device.force * scenario.device.motion, run.x[t >= RELEASE_TIME]
     in_contact = bool(x[len(x) // 2 :].min() > 0.0)  # a hand that bounces off may do so with a bounded amplitude
-    return in_contact and settles(x, EXTRA_SHARE * PRESS_FORCE / (hand.k + gain * _parts(scenario)[0]))
+    return in_contact and settles(x, EXTRA_SHARE * PRESS_FORCE / (hand.k + gain * scenario.stiffness))
 
 
-def response(scenario: HapticScenario) -> FeltResponse:
+def response(scenario: FullScenario) -> FeltResponse:
     """Compute the response of the felt force to a hand that moves in the tissue, without noise."""
     return FeltResponse(FREQUENCIES, np.array([felt_share(scenario, f) for f in FREQUENCIES.tolist()]))
 
 
-def felt_share(scenario: HapticScenario, frequency: float) -> complex:
+def felt_share(scenario: FullScenario, frequency: float) -> complex:
     """T at one frequency [Hz]: the felt force over the force that the tissue would exert at the hand's position."""
-    w, stiffness = 2.0 * math.pi * frequency, _parts(scenario)[0]
-    turns = math.ceil(MIN_WATCH * frequency)
+    w, turns = 2.0 * math.pi * frequency, math.ceil(MIN_WATCH * frequency)
     ticks = round((TRANSIENT + turns / frequency) / scenario.tick)
     t = np.arange(ticks + 1) * scenario.tick
     ease = 0.5 * (1.0 - np.cos(np.pi * np.clip(t / (0.5 * TRANSIENT), 0.0, 1.0)))
@@ -110,37 +108,29 @@ def felt_share(scenario: HapticScenario, frequency: float) -> complex:
     watched = slice(ticks - round(turns / frequency / scenario.tick), ticks)
     middle = run.t[watched] + 0.5 * scenario.tick
     answer = harmonic(middle, run.felt[watched], w) / harmonic(run.t[watched], run.x[watched], w)
-    return answer / (scenario.device.force * scenario.device.motion * (stiffness + 1j * w * scenario.damping))
+    return answer / (scenario.device.force * scenario.device.motion * (scenario.stiffness + 1j * w * scenario.damping))
 
 
-def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, x_0: float, path: Array = NO_PATH) -> LoopRun:
+def _run(scenario: FullScenario, hand: Hand, push: Array, noise: Array, x_0: float, path: Array = NO_PATH) -> LoopRun:
     """Simulate the loop once."""
-    stiffness, _ = _parts(scenario)
     periods = [round(1.0 / rate / scenario.tick) for rate in (scenario.rate, scenario.link_rate)]
     delays = [math.ceil(x / scenario.tick - 1e-9) for x in (scenario.position_delay, scenario.force_delay)]
     clocks = Clocks(scenario.tick, *periods, *delays)
-    tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
+    tissue = FeltTissue(scenario.stiffness, scenario.damping, scenario.friction)
     grip = Grip(*zero_order_hold(hand, scenario.tick), path)
     estimate = filter_in_loop(scenario) if scenario.filtered else lambda reading: reading.force  # sensor at the tip
     axis = _axis(scenario, scenario.device.motion * x_0)
     return simulate(grip, scenario.device, axis, tissue, clocks, push, noise, (x_0, 0.0), estimate)
 
 
-def _turns(scenario: HapticScenario, ticks: int) -> int:
+def _turns(scenario: FullScenario, ticks: int) -> int:
     """The number of controller periods in a number of ticks."""
     return math.ceil(ticks * scenario.tick * scenario.rate - 1e-6)
 
 
-def _parts(scenario: HapticScenario) -> tuple[float, AxisNoise]:
-    """The tissue's stiffness and the noise of a scenario without open fields."""
-    assert scenario.stiffness is not None
-    assert scenario.noise is not None
-    return scenario.stiffness, scenario.noise
-
-
-def _axis(scenario: HapticScenario, q: float) -> Axis:
+def _axis(scenario: FullScenario, q: float) -> Axis:
     """The prismatic joint, at rest at q [m]."""
-    body = scenario.body or SLIDE
+    body = scenario.body
     friction = Friction(*(np.array([float(x)]) for x in (body.viscous, *body.coulomb, *body.static, *body[5:])))
     parts = scenario.motor, scenario.law, friction, Loops(*np.zeros((len(Loops._fields), 1))), at_rest(np.array([q]))
     motors, law, friction_of_body, loops, state = map(records, parts)
@@ -151,16 +141,16 @@ def _axis(scenario: HapticScenario, q: float) -> Axis:
     )  # fmt: skip
 
 
-def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]:
+def filter_in_loop(scenario: FullScenario) -> Callable[[SensorReading], float]:
     """The extended Kalman filter: a function from successive sensor readings to forces.  (7.6), (7.7)"""
-    body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
+    body, T_s = scenario.assumed_body, 1.0 / scenario.rate
     noise, c_b = filter_noise(scenario), coefficients(body)
     predicted: sample.Belief | None = None
 
     def estimate(reading: SensorReading) -> float:
         nonlocal predicted
         if predicted is None:
-            predicted = sample.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)
+            predicted = sample.first(reading.q, reading.dq, noise.r_q, noise.r_dq, scenario.noise.tau)
         now, predicted = ekf.step(predicted, (reading.q, reading.dq), reading.tau, body.inertia, c_b, T_s, noise)
         return now[2]
 
@@ -172,16 +162,15 @@ def coefficients(body: Body) -> Coefficients:
     return body.gravity, 0.0, 0.0, 0.0, body.viscous, 0.5 * sum(body.coulomb), 0.0
 
 
-def filter_noise(scenario: HapticScenario) -> NoiseModel:
+def filter_noise(scenario: FullScenario) -> NoiseModel:
     """The noise per sample that the filter assumes."""
-    body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
-    _, noise = _parts(scenario)
+    body, noise, T_s = scenario.assumed_body, scenario.noise, 1.0 / scenario.rate
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
     walk = model.q_tau or smallest_q_tau(tracker("ekf"), body.inertia, body.viscous, T_s, model, scenario.filter_delay)
     return model._replace(q_tau=walk)
 
 
-def experiment(scenario: HapticScenario, name: str, hand: Hand) -> HapticRun:
+def experiment(scenario: FullScenario, name: str, hand: Hand) -> HapticRun:
     """Simulate the scenario's plan, sampled at the controller's rate, until its end or until the hand leaves the reach.
 
     The error is the root mean square of felt force over force scale, minus true force.

@@ -13,7 +13,7 @@ import numpy as np
 
 from davinci_forces import toml
 from davinci_forces.errors import PipelineError
-from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, THESIS_TISSUE, Hand
 from davinci_forces.maths.constants import PUSH_DELAY
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
 from davinci_forces.robots.from_toml import NAME
@@ -100,6 +100,16 @@ class HapticScenario:
     def duration(self) -> float:
         """The duration of the plan [s]."""
         return self.plan[-1][0] - self.plan[0][0]
+
+
+@dataclass(frozen=True)
+class FullScenario(HapticScenario):
+    """A scenario without open fields, as it is simulated."""
+
+    body: Body = SLIDE
+    noise: AxisNoise = SLIDE_NOISE
+    assumed_body: Body = SLIDE
+    stiffness: float = THESIS_TISSUE
 
 
 def read(file: Path) -> HapticScenario:

@@ -10,7 +10,7 @@ from davinci_forces.filters.response import noise_model
 from davinci_forces.haptics import limits
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
-from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
+from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, FullScenario
 from davinci_forces.identification.joint_models import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.model import ArmMotion, Model
@@ -112,12 +112,10 @@ def body_of(model: Model, theta: Array) -> Body:
     return Body(float(dynamics.inertia[0]), dynamics.coefficients[0], viscous, (coulomb, coulomb), (coulomb, coulomb))
 
 
-def haptic_response(
-    robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.FeltResponse
-) -> HapticResponse:
+def haptic_response(robot: Robot, arm_from: str, scenario: FullScenario, answer: haptic.FeltResponse) -> HapticResponse:
     """The frequency response from the tissue to the hand, and the stiffness that the hand feels."""
     share = float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.share))
-    gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness or float("nan")
+    gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness
     return HapticResponse(
         robot=robot.name, arm_from=arm_from, tissue_stiffness=stiffness, at_frequency=PALPATION_FREQUENCY,
         rendered_stiffness=gain * share * stiffness, transparency=share,
