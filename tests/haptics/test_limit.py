@@ -69,7 +69,8 @@ def test_the_lag_is_the_default_filter_s_in_logs_of_the_joint_that_slides(record
 def test_the_border_of_the_map_is_where_the_matrix_inequality_loses_its_solution(records):
     exact = only(records, StabilityLimit)
     for k, border in zip(exact.k_h[::10].tolist(), exact.k_t_cqlf[::10].tolist(), strict=True):
-        assert cqlf_exists(THESIS_HAND._replace(k=k), np.array([0.99, 1.01]) * border).tolist() == [True, False]
+        hand = THESIS_HAND._replace(k=k)
+        assert [cqlf_exists(hand, share * border) for share in (0.99, 1.01)] == [True, False]
     assert (exact.k_t_switching > exact.k_t_cqlf).all()
 
 

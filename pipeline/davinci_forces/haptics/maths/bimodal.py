@@ -107,9 +107,7 @@ def log_loss_away(zeta: float) -> float:
     """g: the logarithmic loss of speed to damping, on the way from the axis to the turning point."""
     if abs(1.0 - zeta) < SERIES_RANGE:
         return 1.0 + (zeta - 1.0) * 2.0 / 3.0
-    if zeta < 1.0:
-        return zeta / math.sqrt(1.0 - zeta**2) * math.acos(zeta)
-    return zeta / math.sqrt(zeta**2 - 1.0) * math.acosh(zeta)
+    return abs(zeta / cmath.sqrt(1.0 - zeta**2) * cmath.acos(zeta))  # above 1, root and angle are imaginary
 
 
 def log_loss_back(zeta: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from davinci_forces.haptics.maths.bimodal import Hand
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import conic
 
 EXISTS = 1e-7  # least t of an existing function; above the solver's tolerance
@@ -20,18 +20,14 @@ ROOT_2 = float(np.sqrt(2.0))  # factor of the off-diagonal entry in the solver's
 LMI_HALVINGS = 24
 
 
-def cqlf_exists(hand: Hand, k_t: Array) -> Booleans:
-    """Test for each stiffness k_t (N,) [N/m] whether a common quadratic Lyapunov function exists."""
+def cqlf_exists(hand: Hand, k_t: float) -> bool:
+    """Test whether a common quadratic Lyapunov function exists with tissue of stiffness k_t [N/m]."""
     import clarabel
 
     settings, cones = conic.settings(TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3
     cost, quadratic = np.array([0.0, 0.0, -1.0]), csc_array((3, 3))
-    exists = []
-    for k in np.asarray(k_t, float).tolist():
-        A, bound = inequality(hand, k)
-        solution = clarabel.DefaultSolver(quadratic, cost, A, bound, cones, settings).solve()
-        exists.append(solution.x[2] > EXISTS)
-    return np.array(exists, bool)
+    solution = clarabel.DefaultSolver(quadratic, cost, *inequality(hand, k_t), cones, settings).solve()
+    return bool(solution.x[2] > EXISTS)
 
 
 def inequality(hand: Hand, k_t: float) -> tuple[csc_array, Array]:
@@ -51,5 +47,5 @@ def lmi_limit(hand: Hand, high: float) -> float:
     low = 0.0
     for _ in range(LMI_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if cqlf_exists(hand, np.array([middle]))[0] else (low, middle)
+        low, high = (middle, high) if cqlf_exists(hand, middle) else (low, middle)
     return low
