@@ -25,11 +25,10 @@ UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 
 def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[JointCorrelation]:
     """Correlate the errors of the joints in free space, in a log in which all joints move and contacts are known."""
-    names = [joint.name for joint in robot.joints[:TIP_JOINTS]]
-    moving = [track for name in names for track in tracks if track.joint == name and not track.at_rest]
-    if robot.chain is None or len(robot.joints) != TIP_JOINTS:
+    if robot.chain is None or len(robot.joints) != TIP_JOINTS or not entry.has_known_free_motion:
         return
-    if len(moving) < TIP_JOINTS or not entry.has_known_free_motion:
+    moving = [track for joint in robot.joints for track in tracks if track.joint == joint.name and not track.at_rest]
+    if len(moving) < TIP_JOINTS:
         return
     free = free_of(moving, entry)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
@@ -41,15 +40,14 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
 
 def gather(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[ArmCorrelation]:
     """Collect the correlations of at most `MAX_LOGS_CORRELATION` logs."""
-    rows = list(correlations)
-    if not rows:
-        return
-    rows = [rows[i] for i in evenly(len(rows), MAX_LOGS_CORRELATION)]
-    yield ArmCorrelation(
-        robot=robot.name,
-        source=np.array([row.log for row in rows], object),
-        **{name: np.array([getattr(row, name) for row in rows]) for name in ("rho_12", "rho_13", "rho_23")},
-    )
+    every = list(correlations)
+    rows = [every[i] for i in evenly(len(every), MAX_LOGS_CORRELATION)]
+    if rows:
+        yield ArmCorrelation(
+            robot=robot.name,
+            source=np.array([row.log for row in rows], object),
+            **{name: np.array([getattr(row, name) for row in rows]) for name in ("rho_12", "rho_13", "rho_23")},
+        )
 
 
 def apply(
