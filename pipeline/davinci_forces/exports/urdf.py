@@ -22,7 +22,7 @@ from davinci_forces.maths.models.independent import add
 from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import coulomb, viscous
-from davinci_forces.records import Average, Fit, Motion
+from davinci_forces.records import Average, Fit, Motion, by_name
 from davinci_forces.robots.models import ARM
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.robots.urdf import writing
@@ -198,7 +198,7 @@ def _held(arm: IdentifiedArm, log: LogModels, name: str) -> Array:
 def _free_logs(export: Export, model: Model, roles: Sequence[str] = FREE_ROLES) -> FreeLogs:
     """The logs of free motion that hold all joints of a model, and the efforts of each joint in them."""
     free = [motion for motion in export.catalogue.records(Motion) if motion.role in roles]
-    logs = [[motion for motion in free if motion.log == log] for log in dict.fromkeys(motion.log for motion in free)]
+    logs = by_name(free, "log").values()
     whole = [log for log in logs if len(log) == len(model.joints) and len({len(motion) for motion in log}) == 1]
     tau = {name: [motion.tau for log in whole for motion in log if motion.joint == name] for name in model.joints}
     return [LogModels(export.identified, log) for log in whole], tau
