@@ -10,7 +10,8 @@ from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, row_blocks
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.records import JointModel
+from davinci_forces.records import JointModel, Track
+from davinci_forces.robots.robot import Kind, Robot
 
 
 class FilterInput(NamedTuple):
@@ -129,3 +130,10 @@ def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool 
 
     inputs = [LongInput(s.stop - s.start, T_s, initial_std, partial(read, s.start)) for s in segments(model.segment)]
     return [long.part(slice(0, long.samples)) if long.samples <= BLOCK_SAMPLES else long for long in inputs]
+
+
+def prismatic_track(tracks: Iterable[Track], robot: Robot) -> Track | None:
+    """Return the track of the prismatic joint that moves farthest, of those whose effort is a force, not a current."""
+    forces = {joint.name for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort}
+    slides = [track for track in tracks if track.joint in forces and not track.at_rest]
+    return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)

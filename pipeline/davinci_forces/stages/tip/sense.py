@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.filters.problem import prismatic_track
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.force_sensor import MIN_CORRELATION, errors, interpolate_sensor, lag
 from davinci_forces.maths.signals.windows import is_past_transient
 from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, Track, diagnostic
-from davinci_forces.robots.robot import Kind, Robot
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MIN_SAMPLES_ERROR = 100
@@ -102,13 +103,6 @@ def size(force: EstimatedForce) -> EstimatedForce:
     u = force.f / np.maximum(length, 1e-300)[:, None]
     u[:, 0] += length == 0.0  # a zero force has no direction, so any serves
     return force._replace(f=length[:, None], C=np.einsum("ni,nij,nj->n", u, force.C, u)[:, None, None])
-
-
-def prismatic_track(tracks: list[Track], robot: Robot) -> Track | None:
-    """The prismatic joint that moves farthest, of those whose effort is a force."""
-    slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest]
-    forces = [t for t in slides if not robot.joint(t.joint).effort]
-    return max(forces, key=lambda track: float(np.ptp(track.q)), default=None)
 
 
 def sensor_force(

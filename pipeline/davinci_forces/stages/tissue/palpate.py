@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from davinci_forces.filters.problem import prismatic_track
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
 from davinci_forces.maths.signals.windows import unbroken
 from davinci_forces.maths.tissue import palpation, tissue
 from davinci_forces.maths.tissue.indentation import median_std
 from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
-from davinci_forces.robots.robot import Kind, Robot
+from davinci_forces.robots.robot import Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
 
 QUARTILE_FACTOR = 1.857  # of the variance of a mean: p (1 - p) over the square of the normal density, p = 1/4
 MIN_SAMPLES_PUSH = 8  # in a log, and in a push with which tissue models are compared
-FILTER = "ekf"
 
 
 def run(
@@ -62,13 +62,6 @@ def numbered_pushes(data: palpation.Probing) -> list[tuple[Column, Column]]:
     starts = np.flatnonzero(np.diff(data.push)) + 1
     way = np.linalg.norm(data.depth - data.depth[0], axis=1) if data.depth.shape[1] > 1 else data.depth[:, 0]
     return list(zip(np.split(way, starts), np.split(data.size, starts), strict=True))
-
-
-def prismatic_track(tracks: Sequence[Track], robot: Robot) -> Track | None:
-    """The prismatic joint that moves farthest, of those whose effort is a force and not a current."""
-    forces = {joint.name for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort}
-    slides = [track for track in tracks if track.joint in forces and not track.at_rest and track.filter == FILTER]
-    return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)
 
 
 def has_force(touch: Touch) -> bool:
