@@ -108,7 +108,10 @@ def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
-    """Plot position, velocity and acceleration of a period, with limits; raises BadRequest for a suffix not in PLOTS.  Fig 6.5"""
+    """Plot position, velocity and acceleration of a period, with their limits.  Fig 6.5
+
+    Raises BadRequest if the file's name does not end in one of PLOTS.
+    """
     if path.suffix not in PLOTS:
         raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
     import matplotlib as mpl
