@@ -54,13 +54,15 @@ class NamedArray:
         return "number" if kind in NUMBER_KINDS else "complex" if kind == "c" else "text"
 
     def part(self, first: int, last: int) -> Array:
-        """Read the samples from `first` to before `last`; shape (samples, columns)."""
-        index: list[Any] = [slice(None) if axis in self.axes else 0 for axis in range(len(self.data.shape))]
-        index[self.axes[0]] = slice(first, last)
-        part = np.asarray(self.data[tuple(index)], np.float64)
-        if part.ndim == 1:
-            return part[:, None]
-        return part if self.axes[0] < self.axes[1] else part.T
+        """Read the samples from `first` to before `last`, NaN after its end; shape (last - first, columns)."""
+        part = np.empty((0, self.columns))
+        if first < self.rows:
+            index: list[Any] = [slice(None) if axis in self.axes else 0 for axis in range(len(self.data.shape))]
+            index[self.axes[0]] = slice(first, min(last, self.rows))
+            part = np.asarray(self.data[tuple(index)], np.float64)
+            part = part[:, None] if part.ndim == 1 else part if self.axes[0] < self.axes[1] else part.T
+        lacking = last - first - len(part)
+        return np.concatenate((part, np.full((lacking, self.columns), np.nan))) if lacking else part
 
 
 @dataclass
@@ -76,16 +78,10 @@ class ArrayLog(Log):
         step = max(1, BLOCK_CELLS // max(1, sum(array.columns for array in arrays.values())))
         for first in range(0, rows, step):
             last = min(first + step, rows)
-            parts = {which: _filled(array, first, last) for which, array in arrays.items()}
+            parts = {which: array.part(first, last) for which, array in arrays.items()}
             lacking = {name: max(0, last - max(first, array.rows)) for name, (array, _) in of.items()}
             columns = {name: parts[id(array)][:, column] for name, (array, column) in of.items()}
             yield self.count_nans({name: np.ascontiguousarray(column) for name, column in columns.items()}, lacking)
-
-
-def _filled(array: NamedArray, first: int, last: int) -> Array:
-    part = array.part(first, min(last, array.rows)) if first < array.rows else np.empty((0, array.columns))
-    lacking = last - first - len(part)
-    return np.concatenate((part, np.full((lacking, array.columns), np.nan))) if lacking else part
 
 
 def take_in(log: ArrayLog, arrays: Sequence[NamedArray]) -> None:
