@@ -105,7 +105,17 @@ class Log:
         hold NaN are both NaN in the block; `nulls` and `nans` count them separately.  Raises BadLog with the file, line
         and column if damage makes the rest of the file unreadable.
         """
-        self._restart(names)
+        self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
+        self.dropped = 0
+        self._at_open = self._at_open or (len(self.warnings), len(self.comments))
+        del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
+        if problem := next((self.unread[name] for name in names if name in self.unread), ""):
+            raise self.bad(problem)
+        for name in names:
+            if (kind := self.find(name).kind) not in SAMPLED_KINDS:
+                raise self.bad(f"channel {name!r} holds {kind}, not numbers; choose another")
+        if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
+            raise self.bad(f"{', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
         yield from self._read(names)
 
     def _read(self, names: Sequence[str]) -> Iterator[Block]:
@@ -169,20 +179,6 @@ class Log:
             by_name = {channel.name: channel for channel in self.channels}
             self._indexed = self.channels, by_name, {channel.time for channel in self.channels}
         return self._indexed[1:]
-
-    def _restart(self, names: Sequence[str]) -> None:
-        """Reset the counts before blocks are read, and refuse channels that do not hold numbers of one meaning."""
-        self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
-        self.dropped = 0
-        self._at_open = self._at_open or (len(self.warnings), len(self.comments))
-        del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
-        if problem := next((self.unread[name] for name in names if name in self.unread), ""):
-            raise self.bad(problem)
-        for name in names:
-            if (kind := self.find(name).kind) not in SAMPLED_KINDS:
-                raise self.bad(f"channel {name!r} holds {kind}, not numbers; choose another")
-        if len(names) > 1 and len(clocks := self.by_clock(names)) > 1:
-            raise self.bad(f"{', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
     def count_nans(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
         """Count the NaNs of a block and return it: `missing` of each channel are missing, the others logged."""
