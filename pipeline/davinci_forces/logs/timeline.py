@@ -1,11 +1,10 @@
 """Compute sample times of evenly sampled channels from headers of files or blocks, and group channels by clock."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
-from functools import partial
 
 import numpy as np
 
@@ -118,32 +117,24 @@ def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has
         member_sampling = next((sampled[member] for member in group if member in sampled), None)
         return not (member_sampling and name in sampled) or member_sampling.is_like(sampled[name], has_x_columns)
 
-    split = [part for group in groups for part in _grouped(group, is_like, [])]
-    return _grouped([name for name in sampled if not any(name in group for group in groups)], is_like, split)
+    split: list[list[str]] = []
+    new = [name for name in sampled if not any(name in group for group in groups)]
+    for names in (*groups, new):
+        first = 0 if names is new else len(split)  # only new channels may join the parts of another group
+        for name in names:
+            part = next((part for part in split[first:] if is_like(part, name)), None)
+            if part is None:
+                split.append(part := [])
+            part.append(name)
+    return split
 
 
-def _grouped(
-    names: Sequence[str], is_like: Callable[[list[str], str], bool], groups: list[list[str]]
-) -> list[list[str]]:
-    """Add each name to the first of the groups that is like it, else as a new group."""
-    for name in names:
-        group = next((group for group in groups if is_like(group, name)), None)
-        if group is None:
-            groups.append(group := [])
-        group.append(name)
-    return groups
-
-
-def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
-    """Group columns that are equal in all rows, such as the times of one clock; missing values count as equal."""
-    groups = [[*names]]
+def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> dict[str, int]:
+    """Number columns alike that are equal in all rows, as the times of one clock; missing values count as equal."""
+    numbers = dict.fromkeys(names, 0)
     for block in blocks:
-        is_equal = partial(_is_equal, block)
-        groups = [part for group in groups for part in _grouped(group, is_equal, [])]
-        if len(groups) == len(names):
+        met: dict[tuple[int, bytes], int] = {}
+        numbers = {name: met.setdefault((numbers[name], block[name].tobytes()), len(met)) for name in names}
+        if len(met) == len(names):
             break
-    return groups
-
-
-def _is_equal(block: Block, group: list[str], name: str) -> bool:
-    return np.array_equal(block[group[0]], block[name], equal_nan=True)
+    return numbers

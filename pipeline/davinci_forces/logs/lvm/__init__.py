@@ -34,10 +34,6 @@ def read(path: Path, options: Options) -> Log:
         walk.finish()
     except BadContent as problem:
         raise BadLog(f"{path}:{walk.line}: {problem}") from None
-    return _opened(path, options, walk)
-
-
-def _opened(path: Path, options: Options, walk: Walk) -> LvmLog:
     layouts = list(walk.met.values())
     first = layouts[0]
     units: dict[str, str] = {}
@@ -51,7 +47,7 @@ def _opened(path: Path, options: Options, walk: Walk) -> LvmLog:
     dated = walk.file_segments > 1 and first.start is not None
     elapsed = unique(["elapsed"], names)[:dated]
     clock = None if has_x or dated or first.step is None else Clock(first.step, first.x0)
-    warnings = [_rounded(first)] if clock and _rounded(first) else []
+    warnings = [*filter(None, [_rounded(first)])] if clock else []
     new = (Channel(name, "s", derived=True) for name in elapsed)
     log = LvmLog(
         path, "lvm", channels=(*written, *new), clock=clock, time=elapsed[0] if dated else X if has_x else "",
@@ -75,8 +71,7 @@ def _own_clocks(log: LvmLog, walk: Walk, layouts: Sequence[Layout]) -> tuple[Own
     groups = walk.groups
     if len(columns := [*dict.fromkeys(x_of.values())]) > 1:
         aside = replace(log, warnings=[], comments=[], nulls=dict.fromkeys(columns, 0), nans=dict.fromkeys(columns, 0))
-        same = equal_columns(columns, Reading(aside, columns).blocks())
-        number = {x: i for i, group in enumerate(same) for x in group}
+        number = equal_columns(columns, Reading(aside, columns).blocks())
         parts: dict[tuple[int, int], list[str]] = {}
         for i, group in enumerate(groups):
             for name in group:
