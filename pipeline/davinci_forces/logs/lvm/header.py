@@ -71,7 +71,9 @@ class Layout:
 
 def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
     """Parse the header of a file, from its first line; raises BadContent for an impossible mark or X_Columns."""
-    separator = _separator(lines)
+    tag = next(filter(None, map(SEPARATOR.fullmatch, lines[1:])), None)
+    in_first_line = lines[0][len(MAGIC) : len(MAGIC) + 1].strip(b" ") or b"\t"
+    separator = {b"Tab": b"\t", b"Comma": b","}.get(tag[2].strip(), tag[1]) if tag else in_first_line
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
         raise BadContent(
             f"the separator is {decode(separator, encoding)!r}, which cannot separate numbers; export with tabs"
@@ -97,7 +99,12 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     tags = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
     names, remarks = _names(decode(columns, encoding).split(separator), file, line)
     measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
-    _check(tags, len(measured), line, remarks)
+    dimension, stated = _first(tags, "X_Dimension") or "Time", _first(tags, "Channels")
+    if dimension != "Time":
+        raise BadContent(f"the x axis is {dimension}, not time; this is not a recording over time: choose another file")
+    if stated.isdecimal() and int(stated) != len(measured):
+        what = f"the header states {stated} channels, but the column line names {len(measured)}; those are read"
+        remarks.append(f"line {line}: {what}")
     x_unit = _first(tags, "X_Unit_Label") or "s"
     unit_of = (x_unit if _is_x(i, file) else _cell(tags, "Y_Unit_Label", i) for i in range(len(names)))
     units = [unit if name else "" for name, unit in zip(names, unit_of, strict=True)]
@@ -133,13 +140,6 @@ def unescape(comment: bytes, encoding: str | None) -> str:
     return escape.sub(lambda m: "\\" if m[1] == "\\" else chr(int(m[1], 16)), decode(comment, encoding)).strip()
 
 
-def _separator(lines: Sequence[bytes]) -> bytes:
-    for line in lines[1:]:
-        if tag := SEPARATOR.fullmatch(line):
-            return {b"Tab": b"\t", b"Comma": b","}.get(tag[2].strip(), tag[1])
-    return lines[0][len(MAGIC) : len(MAGIC) + 1].strip(b" ") or b"\t"
-
-
 def _is_x(column: int, file: FileHeader) -> bool:
     return column % 2 == 0 if file.x_columns == "Multi" else column == 0
 
@@ -162,17 +162,6 @@ def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], li
     if file.x_columns == "No":
         names[0] = ""
     return names, remarks
-
-
-def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[str]) -> None:
-    dimension = _first(tags, "X_Dimension") or "Time"
-    if dimension != "Time":
-        raise BadContent(f"the x axis is {dimension}, not time; this is not a recording over time: choose another file")
-    stated = _first(tags, "Channels")
-    if stated.isdecimal() and int(stated) != channels:
-        remarks.append(
-            f"line {line}: the header states {stated} channels, but the column line names {channels}; those are read"
-        )
 
 
 def _first(tags: dict[str, list[str]], tag: str) -> str:

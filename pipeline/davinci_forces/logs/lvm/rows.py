@@ -14,7 +14,7 @@ from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.lvm.header import Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.timeline import OwnClock
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array
 
 MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
 MAX_COMMENTS = 1000
@@ -128,26 +128,22 @@ class Reading:
         for name in set(self.names) - set(block):
             block[name], empty[name] = np.full(cells.rows, np.nan), np.ones(cells.rows, dtype=bool)
         self.rows += cells.rows
-        held = self._held(run, cells)
-        if held is not None:
+        together = self._columns_of(run, self.together)
+        if self.together and all(i in cells.empty for i in together):  # rows may lack all samples of this clock
+            held = ~np.all([np.ones(cells.rows, dtype=bool), *(cells.empty[i] for i in together)], axis=0)
             block = {name: values[held] for name, values in block.items()}
             empty = {name: which[held] for name, which in empty.items()}
         nulls = {name: int(np.count_nonzero(which)) for name, which in empty.items()}
         return self.log.count_nans({name: block[name] for name in self.names}, nulls)
 
-    def _held(self, run: Run, cells: Cells) -> Booleans | None:
-        """Mask of the rows with a sample on this clock; None if all have one."""
-        columns = self._columns_of(run, self.together)
-        if not self.together or not all(i in cells.empty for i in columns):
-            return None
-        masks = [np.ones(cells.rows, dtype=bool), *(cells.empty[i] for i in columns)]
-        return np.asarray(~np.logical_and.reduce(masks))
-
     def _look_at(self, run: Run, rows: int) -> None:
         ends = [*(row for row, _ in run.file_segments[1:]), rows]
         for (first, layout), end in zip(run.file_segments, ends, strict=True):
             if layout is not self.file_segment:
-                self._begin_segment(layout)
+                self._check_samples()
+                self.file_segment, self.rows_in_segment = layout, 0
+                if absent := sorted({*(self.first or run.layout).names} - {*layout.names}):
+                    self.say(f"line {layout.line}: from here on without {', '.join(absent)}, read as nulls")
             self.rows_in_segment += end - first
         for line, cell in run.comments[: MAX_COMMENTS - len(self.log.comments)]:
             self.log.comments.append(f"line {line}: {unescape(cell, self.encoding)}")
@@ -158,13 +154,6 @@ class Reading:
                 f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, but cells use "
                 f"{' and '.join(map(repr, written))}; each cell is read with its own"
             )
-
-    def _begin_segment(self, layout: Layout) -> None:
-        self._check_samples()
-        self.file_segment, self.rows_in_segment = layout, 0
-        assert self.first is not None
-        if absent := sorted(set(self.first.names) - set(layout.names)):
-            self.say(f"line {layout.line}: from here on without {', '.join(absent)}, read as nulls")
 
     def _look_back(self, run: Run, x: Array | None) -> None:
         """Count the rows where x does not increase, but for those behind a header or a blank line."""
