@@ -249,8 +249,8 @@ def test_a_scaled_channel_is_read_once_however_long_its_chunk(monkeypatch: pytes
     with TdmsWriter(made) as writer:
         writer.write_segment([ChannelObject("a", "raw", np.arange(rows, dtype=np.float64), scale)])
     octets: list[int] = []
-    own = tdms_samples._read
-    monkeypatch.setattr(tdms_samples, "_read", lambda file, at, many: (octets.append(many), own(file, at, many))[1])
+    own = tdms_samples.read_at
+    monkeypatch.setattr(tdms_samples, "read_at", lambda file, at, many: (octets.append(many), own(file, at, many))[1])
     _, samples = read(made.getvalue(), "log.tdms")
     assert_array_equal(samples["a/raw"], 2.0 * np.arange(rows) + 1.0)
     assert len(octets) > 2

@@ -119,8 +119,8 @@ class TdmsLog(Log):
 
     def _source(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         if paths[0] in self.scaled:
-            most = self.index.largest_chunk(paths)
-            return self._said(samples.scaled_pieces(file, self.size, paths, most), paths[0])
+            chunk = max(kind.counts.get(paths[0], 0) for kind in self.index.kinds)  # as large for each of the group
+            return self._said(samples.scaled_pieces(file, self.size, paths, chunk), paths[0])
         read = pieces(file, self.index.regions(paths[0]), paths, self.origin)
         scales = {path: self.scales[path] for path in paths if path in self.scales}
         return self._said(samples.apply_scales(read, scales), paths[0]) if scales else read
@@ -147,7 +147,9 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
     log.facts |= {key: str(value) for key, value in properties.get("/", {}).items() if isinstance(value, str) and value}
     log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW)
     for path in latest:
-        if problem := samples.problem(scales := _scales(properties, path)):
+        holders = (path, path[: path.find("'/'") + 1], "/")  # the channel itself, else its group, else the file
+        scales = next((words for holder in holders if samples.is_scaled(words := properties.get(holder, {}))), {})
+        if problem := samples.problem(scales):
             raise log.bad(f"channel {path} {problem}")
         if scales and path not in log.scaled:
             log.scales[path] = scales
@@ -168,24 +170,17 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
         log.warnings.append("the file names channels but holds no samples: the recorder stopped before its first write")
 
 
-def _scales(properties: Mapping[str, dict[str, Any]], path: str) -> dict[str, Any]:
-    """Return the properties that scale a channel: its own, else its group's, else the file's."""
-    group = path[: path.find("'/'") + 1]
-    candidates = (properties.get(p, {}) for p in (path, group, "/"))
-    return next((candidate for candidate in candidates if samples.is_scaled(candidate)), {})
-
-
 def _describe_time(
     log: TdmsLog, waveforms: Waveforms, properties: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]
 ) -> None:
     """Set the start of the log, and the clocks from time stamps and waveform properties."""
-    kinds = {channel.name: channel.kind for channel in log.channels}
     stamped = moment(EPOCH, log.origin) if log.origin else None
-    started = stamped or waveforms.first_start
+    waves = (words for writes in waveforms.writes.values() for _, words in writes if words)
+    started = stamped or next((words.start for words in waves if words.start), None)
     timelines = waveforms.timelines(started, properties)
     sampled = {
-        name: Sampled(names(path)[0], sizes[name], kinds[name] == "time", timelines.get(path))
-        for path, name in log.names.items()
+        channel.name: Sampled(names(path)[0], sizes[channel.name], channel.kind == "time", timelines.get(path))
+        for path, channel in zip(log.names, log.channels, strict=True)
     }
     log.made = set_clocks(log, sampled)
     starts = (words.get("wf_start_time") for path, words in properties.items() if path in log.names)

@@ -23,10 +23,7 @@ class Sampled:
 
 
 def set_clocks(log: Log, sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
-    """Set the clocks of a log and of its channels, and return the derived time channels by name.
-
-    The first clock becomes that of the log, unless some channels have no clock: they would wrongly inherit it.
-    """
+    """Set the clocks of a log and of its channels, and return the derived time channels by name."""
     clock_of = _shared(log.channels, sampled, log.cut)
     clocks = list(dict.fromkeys(clock_of.values()))
     if not any(clocks):
@@ -35,7 +32,7 @@ def set_clocks(log: Log, sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
     named = dict(zip(clocks, _names(clocks, log.channels, sampled), strict=True))
     longest = _longest(clock_of, sampled)
     derived = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
-    main = clocks[0] if "" not in clocks else ""
+    main = clocks[0] if "" not in clocks else ""  # of the log; channels without a clock would wrongly inherit it
     log.time = named[main] if main else ""
     if log.time in derived and len(derived[log.time].first) == 1:
         timeline = derived.pop(log.time)
@@ -107,19 +104,21 @@ class Waveforms:
             else:
                 writes.append((count * region.records, words))
 
-    @property
-    def first_start(self) -> datetime | None:
-        """Start of the first channel that states one."""
-        starts = (words.start for writes in self.writes.values() for _, words in writes if words and words.start)
-        return next(starts, None)
-
     def timelines(self, zero: datetime | None, properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Timeline]:
         """Compute the timelines by path, counted from `zero`, where timed; the first properties hold from the start."""
         timelines = {}
         for path, writes in self.writes.items():
             first = next((words for _, words in writes if words), None) or _words(properties.get(path, {}))
-            if first:
-                timelines[path] = _timeline([(rows, words or first) for rows, words in writes], zero)
+            if not first:
+                continue
+            timelines[path], last = Timeline(), None
+            for rows, stated in writes:
+                words = stated or first
+                # The same start with another interval continues from the samples before.
+                goes_on = last is not None and (last.start, last.offset) == (words.start, words.offset)
+                since = (words.start - zero).total_seconds() if words.start and zero else 0.0
+                timelines[path].add(rows, None if goes_on else since + words.offset, words.step)
+                last = words
         return timelines
 
 
@@ -131,14 +130,3 @@ def _words(properties: Mapping[str, Any]) -> Words | None:
     # LabVIEW writes the year 1904 for an unknown start.
     is_stated = isinstance(start, datetime) and start != EPOCH
     return Words(float(step), float(offset), start if is_stated else None)
-
-
-def _timeline(writes: list[tuple[int, Words]], zero: datetime | None) -> Timeline:
-    timeline, last = Timeline(), None
-    for rows, words in writes:
-        # The same start with another interval continues from the samples before.
-        goes_on = last is not None and (last.start, last.offset) == (words.start, words.offset)
-        since = (words.start - zero).total_seconds() if words.start and zero else 0.0
-        timeline.add(rows, None if goes_on else since + words.offset, words.step)
-        last = words
-    return timeline

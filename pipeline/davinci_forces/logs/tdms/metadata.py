@@ -53,7 +53,12 @@ class Objects:
             for _ in range(take.number("I")):
                 path = take.text()
                 properties = self.properties.setdefault(path, {})
-                self._index(path, take.number("I"), take)
+                header = take.number("I")
+                if header == NO_DATA:
+                    self.active.pop(path, None)
+                else:
+                    self.latest[path] = self.latest[path] if header == AS_BEFORE else take.samples(header)
+                    self.active[path] = self.latest[path]
                 for _ in range(take.number("I")):
                     name, value = take.text(), take.value(take.number("I"))
                     if properties.get(name) not in (None, "", value):
@@ -61,14 +66,6 @@ class Objects:
                     properties[name] = value
         except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
             raise BadContent(f"its metadata cannot be parsed after {take.at} bytes ({error})") from None
-
-    def _index(self, path: str, header: int, take: "_Cursor") -> None:
-        if header == NO_DATA:
-            self.active.pop(path, None)
-            return
-        if header != AS_BEFORE:
-            self.latest[path] = take.samples(header)
-        self.active[path] = self.latest[path]
 
 
 class _Cursor:

@@ -1,6 +1,4 @@
-"""Index the samples of a TDMS file, so that any channel is read without the others, as numbers.
-
-They are read in pieces of bounded size; channels of different lengths are read side by side.
+"""Index the samples of a TDMS file, so that any channel is read without the others, in pieces of bounded size.
 
 npTDMS reads channels that need a scale: raw values of DAQ cards, and scales described in the file.  It always gets the
 open file, never its path: it would trust an index file in the same folder, however old or damaged.
@@ -20,7 +18,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.logs.log import Block, concatenate, row_count
 from davinci_forces.logs.tdms.metadata import names
-from davinci_forces.logs.tdms.walk import BLOCK, Column, Region
+from davinci_forces.logs.tdms.walk import BLOCK, Column, Region, read_at
 
 PIECE_ROWS = 1 << 17  # of a piece
 BLOCK_VALUES = 1 << 20  # of a block
@@ -63,10 +61,6 @@ class Index:
             if kind.counts.get(path):
                 yield Region(position, records, stride, kind.columns, kind.counts)
 
-    def largest_chunk(self, paths: Sequence[str]) -> int:
-        """Return the largest number of samples of any of these channels in one record."""
-        return max((kind.counts.get(path, 0) for path in paths for kind in self.kinds), default=0)
-
 
 def rows_of(channels: int) -> int:
     """Number of rows of a block of so many channels."""
@@ -96,18 +90,13 @@ def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iter
     for first in range(0, region.records, many):
         records, start = min(many, region.records - first), region.position + first * region.stride + begin
         if apart:
-            raw = b"".join(_read(file, start + i * region.stride, span) for i in range(records))
+            raw = b"".join(read_at(file, start + i * region.stride, span) for i in range(records))
         else:
-            raw = _read(file, start, (records - 1) * region.stride + span)
+            raw = read_at(file, start, (records - 1) * region.stride + span)
         yield {
             path: np.ndarray((records, c.count), c.dtype, raw, c.offset - begin, (stride, c.step))
             for path, c in columns.items()
         }
-
-
-def _read(file: BinaryIO, position: int, octets: int) -> bytes:
-    file.seek(position)
-    return file.read(octets)
 
 
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
@@ -118,7 +107,7 @@ def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Itera
         for first in range(0, count, rows):
             many = min(rows, count - first)
             yield {
-                path: np.frombuffer(_read(file, start + c.offset + first * c.step, many * c.step), c.dtype)
+                path: np.frombuffer(read_at(file, start + c.offset + first * c.step, many * c.step), c.dtype)
                 for path, c in columns.items()
             }
 
@@ -189,10 +178,7 @@ def problem(properties: dict[str, Any]) -> str:
 
 
 def apply_scales(read: Iterator[Block], scales: Mapping[str, dict[str, Any]]) -> Iterator[Block]:
-    """Scale the samples of some channels by their properties.
-
-    npTDMS would read the whole chunk for every piece of it: time grows with the square of the chunk.
-    """
+    """Scale the samples of some channels, of which npTDMS itself would read the whole chunk for every piece of it."""
     from nptdms.base_segment import RawChannelDataChunk
     from nptdms.scaling import get_scaling
 

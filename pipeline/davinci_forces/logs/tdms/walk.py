@@ -61,7 +61,7 @@ class Walk:
         """Yield the regions of the file, in order."""
         at = 0
         while at < self.size:
-            lead = self._read(at, LEAD_IN)
+            lead = read_at(self.file, at, LEAD_IN)
             if not lead.startswith(TAG) or len(lead) < LEAD_IN:
                 return self._stop(at, lead)
             toc = int.from_bytes(lead[4:8], "little")
@@ -73,7 +73,7 @@ class Walk:
                 return self._stop(at, lead)
             if not whole:
                 end = self._cut(at, data, length)
-            metadata = self._read(at + LEAD_IN, raw)
+            metadata = read_at(self.file, at + LEAD_IN, raw)
             try:
                 if toc & HAS_METADATA:
                     self.objects.update(metadata, order, bool(toc & HAS_NEW_LIST))
@@ -88,10 +88,6 @@ class Walk:
             self.file_segments += 1 + more
             at = self.end = end + more * (LEAD_IN + length)
         return None
-
-    def _read(self, at: int, length: int) -> bytes:
-        self.file.seek(at)
-        return self.file.read(length)
 
     def _stop(self, at: int, lead: bytes) -> None:
         size = self.size - at
@@ -124,21 +120,18 @@ class Walk:
     def _next_tag(self, at: int) -> int:
         """Find the position of the next lead-in, or the end of the file."""
         while at < self.size:
-            block = self._read(at, BLOCK)
+            block = read_at(self.file, at, BLOCK)
             tag = block.find(TAG)
             while tag >= 0:
-                if self._read(at + tag, 12)[8:] in VERSIONS:
+                if read_at(self.file, at + tag, 12)[8:] in VERSIONS:
                     return at + tag
                 tag = block.find(TAG, tag + 1)
             at += max(len(block) - len(TAG) + 1, 1)
         return self.size
 
     def _alike(self, head: bytes, at: int, stride: int) -> int:
-        """Count the following file segments with the same lead-in and metadata.
-
-        The number compared at once grows, so that a file of unequal file segments is not read many times.
-        """
-        alike, window = 0, stride
+        """Count the following file segments with the same lead-in and metadata."""
+        alike, window = 0, stride  # the window grows, so that a file of unequal file segments is not read many times
         while True:
             many = min(self.size - at, window) // stride
             same = self._same(head, at, stride, many)
@@ -150,8 +143,8 @@ class Walk:
     def _same(self, head: bytes, at: int, stride: int, many: int) -> int:
         """Count the next file segments that begin like this: compared at once if small, else one by one."""
         if stride > SMALL_SEGMENT:
-            return next((i for i in range(many) if self._read(at + i * stride, len(head)) != head), many)
-        block = np.frombuffer(self._read(at, many * stride), np.uint8).reshape(many, stride)
+            return next((i for i in range(many) if read_at(self.file, at + i * stride, len(head)) != head), many)
+        block = np.frombuffer(read_at(self.file, at, many * stride), np.uint8).reshape(many, stride)
         differ = np.flatnonzero((block[:, : len(head)] != np.frombuffer(head, np.uint8)).any(axis=1))
         return int(differ[0]) if len(differ) else many
 
@@ -171,6 +164,12 @@ class Walk:
         for i in range(1 + more):
             for region in regions:
                 yield replace(region, position=region.position + i * stride)
+
+
+def read_at(file: BinaryIO, position: int, octets: int) -> bytes:
+    """Read so many bytes from a position on, or as many as there are."""
+    file.seek(position)
+    return file.read(octets)
 
 
 def _regions(
