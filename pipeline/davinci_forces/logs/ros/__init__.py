@@ -7,12 +7,11 @@ from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
 BAG_BEGINNINGS = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
-FOLDER_METADATA = b"rosbag2_bagfile_information:"  # beginning of the description of a bag in a folder
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file begins as a bag, or describes a bag in a folder."""
-    return head.startswith(BAG_BEGINNINGS) or head.lstrip().startswith(FOLDER_METADATA)
+    return head.startswith(BAG_BEGINNINGS) or head.lstrip().startswith(b"rosbag2_bagfile_information:")
 
 
 def read(path: Path, options: Options) -> Log:

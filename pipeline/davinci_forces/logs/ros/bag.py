@@ -17,7 +17,6 @@ from davinci_forces.logs.timeline import UNIX_EPOCH
 
 UNSTEADY = "lists of unsteady length"  # kind of their channels
 SERVICES = ("rosgraph_msgs/msg/Log", "rcl_interfaces/msg/")  # types that ROS needs itself
-ENCODINGS_OF_MESSAGES = ("cdr", "ros1")
 SHOWN_TOPICS = 12
 
 
@@ -138,7 +137,7 @@ def _wide(layout: Layout) -> str:
 
 
 def _layout(connection: Any, content: bytes, first: Layout | None = None) -> Layout:
-    if connection.ext not in ENCODINGS_OF_MESSAGES:
+    if connection.ext not in ("cdr", "ros1"):
         raise BadContent(f"is encoded as {connection.ext}")
     ros1 = connection.ext == "ros1"
     return layout_of(content, connection.msgtype, types_of(connection.msgdef, connection.msgtype, ros1), ros1, first)
@@ -177,12 +176,18 @@ class BagLog(Log):
             table = batch.table(rows)
             while len(rows):
                 first = number + int(rows[0])
-                layout = self._layout_of(topic, connections[batch.owners[rows[0]]], table[0].tobytes(), first)
+                try:
+                    layout = _layout(connections[batch.owners[rows[0]]], table[0].tobytes(), topic.first)
+                except BadContent as how:
+                    raise self.bad(f"message {first} of {topic.name} {how}; record these separately") from None
                 alike = (table[:, layout.fixed] == table[0, layout.fixed]).all(axis=1)
                 same, part = (rows, table) if alike.all() else (rows[alike], table[alike])
                 if topic.is_of_others(layout):
+                    if not self.dropped:
+                        others = f"message {first} of {topic.name} is of other joints ({', '.join(layout.joints)})"
+                        self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")
                     is_read[same] = False
-                    self._drop(topic, layout, first, len(same))
+                    self.dropped += len(same)
                 else:
                     there = slice(None) if len(same) == len(kinds) else same
                     for column, name in zip(values, names, strict=True):
@@ -192,12 +197,6 @@ class BagLog(Log):
         if received in names:
             values[names.index(received)] = (batch.times - self.origin) / 1e9
         return self.count_nans(dict(zip(names, values if is_read.all() else values[:, is_read], strict=True)))
-
-    def _layout_of(self, topic: Topic, connection: Any, content: bytes, number: int) -> Layout:
-        try:
-            return _layout(connection, content, topic.first)
-        except BadContent as how:
-            raise self.bad(f"message {number} of {topic.name} {how}; record these separately") from None
 
     def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
         quantity = name.removeprefix(f"{topic.name}/")
@@ -210,9 +209,3 @@ class BagLog(Log):
             f"message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
             "the first message has; record these separately"
         )
-
-    def _drop(self, topic: Topic, layout: Layout, number: int, count: int) -> None:
-        if not self.dropped:
-            others = f"message {number} of {topic.name} is of other joints ({', '.join(layout.joints)})"
-            self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")
-        self.dropped += count

@@ -91,7 +91,8 @@ def layout_of(content: bytes, kind: str, types: Any, ros1: bool, first: Layout |
     try:
         walk = _Walk(content, types, ros1)
         walk.message(kind, "", "", _holder(types[kind][1]))
-        walk.require_end()
+        if not 0 <= len(content) - walk.at < (1 if ros1 else 4):  # the padding of CDR
+            raise IndexError
     except KeyError as missing:
         raise BadContent(f"holds {missing.args[0]}, which the bag does not define") from None
     except (struct.error, IndexError, UnicodeDecodeError, RecursionError):
@@ -128,11 +129,6 @@ class _Walk:
             inside = path if name == holder else f"{path}.{name}".lstrip(".")
             self._field(inside, node, of, UNITS.get(kind, {}).get(name, unit), path)
 
-    def require_end(self) -> None:
-        """Refuse bytes behind the message, but for the padding of CDR."""
-        if not 0 <= len(self.content) - self.at < (1 if self.ros1 else 4):
-            raise IndexError
-
     def _field(self, path: str, node: Any, of: Any, unit: str, scope: str) -> None:
         if node == Nodetype.BASE:
             self._base(path, of[0], None, unit)
@@ -152,7 +148,11 @@ class _Walk:
             if length > len(self.content):
                 raise IndexError
             if inner == Nodetype.BASE and kind[0] == "string":
-                self._strings(path, length, scope)
+                places = [self._text() for _ in range(length)]
+                if path.rpartition(".")[2] in JOINT_LISTS:
+                    self.fixed += places
+                    texts = (self.content[place.start : place.stop] for place in places)
+                    self.names[scope] = tuple(text.decode().rstrip("\0") for text in texts)
             elif inner == Nodetype.BASE:
                 self._base(path, kind[0], length, unit)
             else:
@@ -200,12 +200,6 @@ class _Walk:
         size = self._length()
         at = self._pass(1, size)
         return range(at, at + size)
-
-    def _strings(self, path: str, length: int, scope: str) -> None:
-        places = [self._text() for _ in range(length)]
-        if path.rpartition(".")[2] in JOINT_LISTS:
-            self.fixed += places
-            self.names[scope] = tuple(self.content[p.start : p.stop].decode().rstrip("\0") for p in places)
 
     def layout(self, kind: str, first: Layout | None) -> Layout:
         """Name the numbers."""

@@ -23,13 +23,12 @@ except ImportError:
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.log import BadContent
+from davinci_forces.maths.arrays import Integers
 
-Integers = NDArray[np.int64]
 Table = Callable[[Integers], NDArray[np.uint8]]  # from numbers of messages of one size to their bytes, a row each
 DECOMPRESSORS: dict[str, Any] = {
     "bz2": bz2.BZ2Decompressor, "lz4": lz4.frame.LZ4FrameDecompressor, "zstd": zstd.ZstdDecompressor,
 }  # fmt: skip
-UNPACKED = ("", "none")  # names of no compression
 DECOMPRESSION_ERRORS = (OSError, RuntimeError, ValueError, EOFError, zstd.ZstdError)  # raised by decompressors
 MALFORMED = (struct.error, KeyError, IndexError, ValueError)  # raised by records that are no records
 CACHED_CHUNKS = 4
@@ -54,7 +53,7 @@ class Chunk:
 
     def unpack(self) -> memoryview:
         """Decompress it, of a chunk that is not whole as much as there is."""
-        if self.compression in UNPACKED:
+        if self.compression in ("", "none"):
             unpacked = self.content
         elif self.compression not in DECOMPRESSORS:
             raise BadContent(f"a chunk is compressed by {self.compression!r}, which is not supported")
@@ -81,18 +80,15 @@ class Batch:
 
 @dataclass
 class Scan:
-    """The messages of a file of records, by connection.
-
-    `connections` holds name, type, definition and encoding of topics.  `at` is where scanning ended.
-    """
+    """The messages of a file of records, by connection."""
 
     path: Path
-    connections: list[Any] = field(default_factory=list)
+    connections: list[Any] = field(default_factory=list)  # name, type, definition and encoding of topics
     warnings: list[str] = field(default_factory=list)
     cut: bool = False
     chunks: list[Chunk] = field(default_factory=list)  # the first is the file
     places: dict[int, "array[int]"] = field(default_factory=dict)  # time, chunk, begin and end of messages
-    at: int = 0
+    at: int = 0  # where scanning ended
     chunk: int = 0  # that is scanned
 
     def open(self) -> None:
@@ -112,7 +108,12 @@ class Scan:
             raise BadLog(f"{self.path}: this bag is damaged at byte {self.at} ({problem}); record it again")
         if problem or not self.is_closed(content):
             self.cut = True
-            self._warn()
+            times = [t for places in self.places.values() for t in places[::4]]
+            span = (max(times) - min(times)) / 1e9 if times else 0.0
+            self.warnings.append(
+                f"{self.path.name} is cut, or its recorder did not close it: {len(times)} messages over {span:.3f} s "
+                f"are whole and are read, up to byte {self.at} of {len(content)}"
+            )
         else:
             self.compare()
         self.connections = [c._replace(msgcount=len(self.places[c.id]) // 4) for c in self.connections]
@@ -128,14 +129,6 @@ class Scan:
     def compare(self) -> None:
         """Compare the messages with what the closed file says of them; raises BadLog."""
         raise NotImplementedError
-
-    def _warn(self) -> None:
-        times = [t for places in self.places.values() for t in places[::4]]
-        span = (max(times) - min(times)) / 1e9 if times else 0.0
-        self.warnings.append(
-            f"{self.path.name} is cut, or its recorder did not close it: {len(times)} messages over {span:.3f} s are "
-            f"whole and are read, up to byte {self.at} of {len(self.chunks[0].content)}"
-        )
 
     def require_count(self, where: str, topic: str, stated: int, count: int) -> None:
         """Require that as many messages are there as the file states."""

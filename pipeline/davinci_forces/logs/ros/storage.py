@@ -17,12 +17,12 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.ros.mcap import Mcap
+from davinci_forces.logs.ros.mcap import FORMATS_OF_DEFINITIONS, Mcap
 from davinci_forces.logs.ros.rosbag1 import Rosbag1
-from davinci_forces.logs.ros.scan import BATCH_BYTES, BATCH_MESSAGES, MAX_SIZES, Batch, Integers, Table, decompress
+from davinci_forces.logs.ros.scan import BATCH_BYTES, BATCH_MESSAGES, MAX_SIZES, Batch, Table, decompress
+from davinci_forces.maths.arrays import Integers
 
 RULE = "=" * 80 + "\n"  # between definitions in IDL
-LITERAL = "/:"  # characters of a path that an SQLite address may hold unquoted
 PAGES = slice(28, 32)  # bytes of a database's header with the number of pages
 PAGE = slice(16, 18)  # and with the size of a page
 TABLES = ("topics", "message_definitions", "messages")
@@ -33,8 +33,6 @@ MESSAGE_SIZES = """
     ON CONFLICT DO UPDATE SET count = count + 1, timestamp = min(timestamp, excluded.timestamp),
     id = CASE WHEN excluded.timestamp < timestamp THEN excluded.id ELSE id END;
 """
-STORAGES = (".db3", ".mcap")  # of a bag in a folder
-FORMATS_OF_ROS_2 = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
 
 
 class Database:
@@ -49,7 +47,7 @@ class Database:
 
     def open(self) -> None:
         """List the topics; raises BadLog if it is no bag."""
-        address = f"file:{quote(self.path.as_posix(), safe=LITERAL)}?immutable=1"  # no file appears beside it
+        address = f"file:{quote(self.path.as_posix(), safe='/:')}?immutable=1"  # no file appears beside it
         try:
             self.base = self._whole_rows() or sqlite3.connect(address, uri=True)
             self.connections = list(self._listed())
@@ -99,7 +97,7 @@ class Database:
         query = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         for number, topic, kind, serialization in self.base.execute(query):
             encoding, text = definitions.get(kind, ("", ""))
-            definition = MessageDefinition(FORMATS_OF_ROS_2.get(encoding, MessageDefinitionFormat.NONE), text)
+            definition = MessageDefinition(FORMATS_OF_DEFINITIONS.get(encoding, MessageDefinitionFormat.NONE), text)
             count = sum(size[-1] for size in self.sizes.setdefault(number, []))
             yield Connection(number, topic, kind, definition, "", count, serialization, self)
 
@@ -143,7 +141,8 @@ class Bag:
 
     def _described(self, path: Path) -> Sequence[Any]:
         if not (path / "metadata.yaml").exists():
-            files = sorted((f for f in path.iterdir() if f.suffix in STORAGES), key=lambda f: (len(f.name), f.name))
+            storages = (file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
+            files = sorted(storages, key=lambda f: (len(f.name), f.name))
             self.warnings.append(f"no metadata.yaml describes {', '.join(f.name for f in files)}; all are read")
             return _opened(files)
         self.folder = Folder(path)  # which removes files that it decompressed when it is forgotten
