@@ -126,6 +126,11 @@ class Log:
         """The error of a problem of this log, which names its file."""
         return BadLog(f"{self.path}: {problem}")
 
+    def remember(self, warnings: Sequence[str], comments: Sequence[str]) -> None:
+        """Add the warnings and comments of another pass over the same samples, each once."""
+        self.warnings += [warning for warning in warnings if warning not in self.warnings]
+        self.comments += [comment for comment in comments if comment not in self.comments]
+
     def find(self, name: str | int) -> Channel:
         """Find a channel by name, a unique last part of it, or its number from 0; raises BadLog with the closest."""
         if isinstance(name, int):

@@ -31,7 +31,15 @@ def read(path: Path, options: Options, reader: str, package: str = "") -> Log:
     """
     if package and find_spec(package) is None:
         raise BadLog(f"{path}: {package}, which reads it, is not installed; run: {install(package)}")
-    request = _request(path, reader)
+    files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]  # right in a bag
+    for file in files:
+        require_file(file)  # which libraries do not
+    size = sum(file.stat().st_size for file in files)
+    request = {
+        "reader": reader, "path": str(path.absolute()), "names": None, "size": size,
+        "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
+        "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
+    }  # fmt: skip
     for message, _ in _answers(path, request):
         state = message
     return IsolatedLog(path, request=request, **state)
@@ -56,29 +64,11 @@ class IsolatedLog(Log):
                 raise self.bad(f"its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}")
             if columns:
                 yield dict(zip(names, columns, strict=True))
-            if end := message.get("end"):
-                self._take(end)
-
-    def _take(self, end: Message) -> None:
-        """Add the child's warnings and counts; another child may read channels of another clock at the same time."""
-        self.warnings += [warning for warning in end["warnings"] if warning not in self.warnings]
-        self.comments += [comment for comment in end["comments"] if comment not in self.comments]
-        self.facts |= end["facts"]
-        self.dropped += end["dropped"]
-        self.cut |= end["cut"]
-
-
-def _request(path: Path, reader: str) -> Message:
-    """Ask for a log, or a bag of the files right in a folder; refuses what is not a file, which libraries do not."""
-    files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
-    for file in files:
-        require_file(file)
-    size = sum(file.stat().st_size for file in files)
-    return {
-        "reader": reader, "path": str(path.absolute()), "names": None, "size": size,
-        "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
-        "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
-    }  # fmt: skip
+            if end := message.get("end"):  # another child may read channels of another clock at the same time
+                self.remember(end["warnings"], end["comments"])
+                self.facts |= end["facts"]
+                self.dropped += end["dropped"]
+                self.cut |= end["cut"]
 
 
 def _answers(path: Path, request: Message) -> Iterator[Answer]:

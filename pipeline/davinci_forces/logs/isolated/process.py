@@ -69,7 +69,13 @@ class Child:
                 more = message.pop("more", False)
                 yield message, columns
         except (EOFError, OSError, pickle.UnpicklingError) as error:
-            raise ChildEnded(self._why(request)) from error
+            code = self.process.wait()
+            why = f"crashes the reader process ({f'signal {-code}' if code < 0 else f'code {code}'})"
+            if self.late:
+                why = f"takes more than {request['seconds']:.0f} s"
+            elif code == -OUT_OF_TIME:
+                why = f"takes more than {request['cpu']:.0f} s of CPU time"
+            raise ChildEnded(why) from error
 
     @contextmanager
     def _within(self, seconds: float) -> Iterator[None]:
@@ -85,14 +91,6 @@ class Child:
     def _end_late(self) -> None:
         self.late = True
         self.process.kill()
-
-    def _why(self, request: Message) -> str:
-        code = self.process.wait()
-        if self.late:
-            return f"takes more than {request['seconds']:.0f} s"
-        if code == -OUT_OF_TIME:
-            return f"takes more than {request['cpu']:.0f} s of CPU time"
-        return f"crashes the reader process ({f'signal {-code}' if code < 0 else f'code {code}'})"
 
     def close(self) -> None:
         """End the process if this process started it: after a fork, the parent's children are listed here, too."""

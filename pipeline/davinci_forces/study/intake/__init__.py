@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from davinci_forces.logs.joined import FILLED_IN
-from davinci_forces.logs.log import Block, Channel, Log
+from davinci_forces.logs.log import Block, Channel, Log, row_count
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.signals.clock import ClockStatistics
 from davinci_forces.maths.signals.faults import steps
@@ -126,14 +126,18 @@ class Intake:
     def recordings(self, block: Block) -> Iterator[Recording | Touch]:
         """Convert one block to recordings of its joints and a touch, without the skipped start."""
         block = self.until_the_end(block)
-        if not len(block[self.names[0]]):
+        if not row_count(block):
             return
-        for name in self.names:
-            if name in block:
-                self.require_numbers(name, block[name])
+        for name in (name for name in self.names if name in block):
+            self.require_numbers(name, block[name])
         t = self.times(block)
         self.clock.update(t, [block[c.name] for q, c in self.channels.items() if q != "time"])
-        self.require_increasing()
+        if self.clock.backward or self.clock.repeated:
+            before, after = self.clock.bad_pair
+            raise self.log.bad(
+                f"time does not increase at row {self.clock.bad_row} (counted from 0): {before:.9g} s, then "
+                f"{after:.9g} s; name another time channel, or give rate = ... [Hz] to count samples instead"
+            )
         first = self.clock.first
         selected = t - first >= self.entry.skip - 1e-9
         for name in self.entry.joints:
@@ -153,7 +157,7 @@ class Intake:
 
     def until_the_end(self, block: Block) -> Block:
         """A block without the rows after the study's `until`, whatever they hold."""
-        if self.entry.until is None or not len(block[self.names[0]]):
+        if self.entry.until is None or not row_count(block):
             return block
         t = self.times(block)
         after = np.flatnonzero(t - (self.clock.first if self.rows else t[0]) > self.entry.until + 1e-9)
@@ -163,10 +167,8 @@ class Intake:
         return {name: values[: int(after[0])] for name, values in block.items()}
 
     def times(self, block: Block) -> Column:
-        """Time of each row [s]: by the study's time channel or rate, or the log's time channel or clock; else its
-        number.
-        """
-        return self.clocks.times(block, self.rows, len(block[self.names[0]]))
+        """Time of each row of the next block [s], or its number where there is no clock."""
+        return self.clocks.times(block, self.rows)
 
     def to_si(self, block: Block, quantity: str) -> Column:
         """Convert a channel to SI: offset first, in the channel's unit, then sign, scale and unit."""
@@ -199,16 +201,6 @@ class Intake:
             "row as a separate log"
         )
 
-    def require_increasing(self) -> None:
-        """Refuse a clock that stands still or goes back, with the row."""
-        clock = self.clock
-        if clock.backward or clock.repeated:
-            raise self.log.bad(
-                f"time does not increase at row {clock.bad_row} (counted from 0): "
-                f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
-                "or give rate = ... [Hz] to count samples instead"
-            )
-
 
 def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
     """Remove jumps of the clock from its channel, where the motion shows that no time passed.
@@ -216,11 +208,9 @@ def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Blo
     Only for identification logs: others lose nothing by a gap, and their contact windows are times of their clock.
     The end of a block waits for the next, which shows how the motion continues, and whether it repeats.
     """
-    blocks = iter(blocks)
     first = next(blocks, None)  # with it, the clocks are known
     several = intake.clocks.are_several
-    name = ALIGNED if several else intake.clocks.time
-    blocks = chain([first] if first else [], blocks)
+    name, blocks = ALIGNED if several else intake.clocks.time, chain([first] if first else [], blocks)
     if not name or intake.entry.role != "identification":
         yield from blocks
         return

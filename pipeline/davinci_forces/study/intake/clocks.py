@@ -11,7 +11,7 @@ from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log, row_count
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.units import since_1970
 from davinci_forces.maths.units import size as size_of
-from davinci_forces.study import LogEntry, Source
+from davinci_forces.study import LogEntry
 from davinci_forces.study.intake.missing import MissingSamples, split_by_rhythm, without_empty_rows
 
 MAX_SECONDS = 1e11  # [s] a later time since 1970 is in a smaller unit
@@ -42,6 +42,7 @@ class UsedClocks:
     units: dict[str, float] = field(default_factory=dict)  # by time channel, its unit since 1970 [s]
 
     def __post_init__(self) -> None:
+        self.time_source = next((source for source in self.entry.channels if source.quantity == "time"), None)
         groups = [part for time, names in self.log.by_clock(self.used).items() for part in self._split(time, names)]
         if self.time_source and not any(group.is_stated for group in groups):
             raise self.log.bad(
@@ -50,11 +51,7 @@ class UsedClocks:
             )
         self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
         self.missing.until = np.inf if self.entry.until is None else self.entry.until
-        self._require_clocks_of_used()
-
-    def _require_clocks_of_used(self) -> None:
-        """Refuse the clock of a channel that is not used, if the log says nothing of the clock of those that are."""
-        lent = self.log.lent
+        lent = self.log.lent  # the clock of a channel that is not used is not that of those that are
         for group in () if self.entry.rate else self.groups:
             names = [self.log.find(name).name for name in group.names]
             if not group.is_stated and all(name in lent and lent[name] not in names for name in names):
@@ -62,11 +59,6 @@ class UsedClocks:
                     f"the log states no sampling time of channel {names[0]!r}, only of "
                     f"{lent[names[0]]!r}, which is not used; give rate = ... [Hz], or name its time in [log.channels]"
                 )
-
-    @property
-    def time_source(self) -> Source | None:
-        """The source of the time in the study, if it names one."""
-        return next((source for source in self.entry.channels if source.quantity == "time"), None)
 
     @property
     def are_several(self) -> bool:
@@ -132,7 +124,10 @@ class UsedClocks:
             for t, block in align(first, followers, self.done, self.log.bad):
                 yield block | {ALIGNED: t}
         finally:
-            self._noticed(logs)
+            for log in logs:
+                self.log.remember(log.warnings, log.comments)
+                self.log.nulls, self.log.nans = self.log.nulls | log.nulls, self.log.nans | log.nans
+                self.log.dropped = max(self.log.dropped, log.dropped)
 
     def _on_one_clock(self, timed: Iterator[TimedBlock]) -> Iterator[Block]:
         """Yield the samples of the only clock, with times where rows that are left out would spoil a count."""
@@ -148,24 +143,15 @@ class UsedClocks:
     def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:
         rows = 0
         for block in log.blocks(list(dict.fromkeys((*group.names, *([group.time] if group.time else []))))):
-            count = row_count(block)
-            yield self.times(block, rows, count, group), block
-            rows += count
+            yield self.times(block, rows, group), block
+            rows += row_count(block)
 
-    def _noticed(self, logs: Sequence[Log]) -> None:
-        """Collect the remarks of all passes."""
-        for log in logs:
-            self.log.warnings += [warning for warning in log.warnings if warning not in self.log.warnings]
-            self.log.comments += [comment for comment in log.comments if comment not in self.log.comments]
-            self.log.nulls, self.log.nans = self.log.nulls | log.nulls, self.log.nans | log.nans
-            self.log.dropped = max(self.log.dropped, log.dropped)
-
-    def times(self, block: Block, rows: int, count: int, group: ClockGroup | None = None) -> Array:
-        """Times of `count` rows of a block [s] that follow `rows` others; their numbers if there is no clock."""
+    def times(self, block: Block, rows: int, group: ClockGroup | None = None) -> Array:
+        """Times [s] of a block after `rows` others: by the study's channel or rate, else by the log, else numbers."""
         if ALIGNED in block:
             return block[ALIGNED]
         group = group or self.groups[0]
-        number = rows + np.arange(count)
+        number = rows + np.arange(row_count(block))
         if group.is_stated and self.time_source:
             t = (block[group.time] + self.time_source.offset) * (self.time_source.sign * self.scale)
             return t * self._since_1970(group.time, t)

@@ -15,10 +15,7 @@ REACH_ROWS = 1 << 10  # rows on either side that filling looks at; a longer run 
 
 
 def split_by_rhythm(t: Array, block: dict[str, Array], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Group channels by the rows that hold their samples, if one is sampled in a slower rhythm than the rows.
-
-    Otherwise the list is empty, and samples are missing where there are none.
-    """
+    """Group channels by the rows that hold their samples; empty if none has a slower rhythm, so that samples miss."""
     slower = {name: mask for name in names if is_slower(t, mask := np.isnan(block[name]))}
     groups: dict[bytes, list[str]] = {}
     for name in names if slower else ():
@@ -54,10 +51,7 @@ class MissingSamples:
     at_end: int = 0  # of those, the rows after the last that is not left out
 
     def without_missing(self, timed: Iterator[TimedBlock], names: Sequence[str]) -> Iterator[TimedBlock]:
-        """Yield the rows in which no sample of these channels is missing; `FILLED_IN` is 1 where one was filled in.
-
-        Rows with missing samples wait for those that follow them.
-        """
+        """Yield the rows in which no sample of these channels is missing; `FILLED_IN` is 1 where one was filled in."""
         self.channels |= {name: Missing() for name in names}
         t, block, done, T_s, end = np.empty(0), dict[str, Array](), 0, 0.0, np.nan
         for new_t, new in timed:
@@ -66,7 +60,7 @@ class MissingSamples:
             if len(t) > 1 and np.isnan(end):
                 T_s, end = float(np.median(np.diff(t))), float(t[0]) + self.until
             waits = any(np.isnan(block[name][done:]).any() for name in names)
-            ready = max(len(t) - REACH_ROWS, done) if waits else len(t)
+            ready = max(len(t) - REACH_ROWS, done) if waits else len(t)  # missing samples wait for rows that follow
             yield self._part(t, block, names, slice(done, ready), T_s, end)
             begin = max(ready - REACH_ROWS, 0)
             t, block, done = t[begin:], {name: x[begin:] for name, x in block.items()}, ready - begin
