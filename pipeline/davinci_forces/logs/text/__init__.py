@@ -13,8 +13,7 @@ from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, parse
 from davinci_forces.logs.lines import GZIP, Lines, decode
 from davinci_forces.logs.log import BadContent, Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import ABSENT, Dialect, find_dialect
-from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, both_readings, number_in, split_cells
+from davinci_forces.logs.text.rows import FRAME_BYTES, NAMED, NO_ROW, NUMBERS, both_readings, number_in, split_cells
 from davinci_forces.logs.text.stamps import Unwrapped
 from davinci_forces.maths.arrays import Array
 

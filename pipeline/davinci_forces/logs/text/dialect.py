@@ -10,8 +10,7 @@ import numpy as np
 
 from davinci_forces.logs.cells import MISSING
 from davinci_forces.logs.log import BadContent, Channel, Options, unique
-from davinci_forces.logs.text.marks import find_marks
-from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, both_readings, split_cells
+from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, both_readings, find_marks, split_cells
 from davinci_forces.logs.text.stamps import Stamps, both_dates, stamps_of
 from davinci_forces.maths.units import UNSIZED, canonical, measures, since_1970, split_ratio, unit_in
 
@@ -236,13 +235,9 @@ def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimite
     cells_above = zip(units, *(rows[i] for i in above[::-1]), strict=True) if above else ()
     units = [unit or next(filter(None, map(unit_in, cells)), "") for unit, *cells in cells_above] or units
     preamble = [line for i, line in enumerate(lines) if i not in (of_names, of_units)]
-    return _split(names or [""] * width, units, preamble)
-
-
-def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
-    """Take the units out of the names: where one name is a quantity over its unit, all of that form are."""
+    names = names or [""] * width
     ratios = [split_ratio(name) for name in names]
-    if any(unit for _, unit in ratios):
+    if any(unit for _, unit in ratios):  # where one name is a quantity over its unit, all of that form are
         over = (name.partition(" / ") for name in names)
         ratios = [ratio if ratio[1] else (name, unit) for ratio, (name, _, unit) in zip(ratios, over, strict=True)]
     stems = [stem for stem, _ in ratios]

@@ -38,7 +38,7 @@ REWRITTEN: dict[re.Pattern[str], tuple[tuple[str, str], ...]] = {
     COMPACT: ((r"^(\d{4})(\d\d)(\d\d)[T_ -]?(\d\d)(\d\d)(\d\d)", r"\1-\2-\3 \4:\5:\6"),),
     TIME_OF_DAY: ((r"^(\d\d?:)", r"1970-01-01 0\1"), (r" 0(\d\d:)", r" \1")),
 }  # fmt: skip
-DAY, HOUR = 86400.0, 3600.0  # [s]
+DAY = 86400.0  # [s]
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,8 @@ class Stamps:
 
     @property
     def first_moment(self) -> str:
-        """The first date and time in ISO 8601, in UTC if the cells state a zone; "" for times of day."""
-        moment = datetime(1970, 1, 1) + timedelta(microseconds=self.zero // 1000)
-        return moment.isoformat() if self.has_date else ""
+        """The first date and time in ISO 8601, in UTC if the cells state a zone."""
+        return (datetime(1970, 1, 1) + timedelta(microseconds=self.zero // 1000)).isoformat()
 
     def seconds(self, cells: "pa.ChunkedArray") -> Array:
         """Convert cells to seconds since zero (N,), NaN where empty; raises pa.ArrowInvalid at another format."""
@@ -68,7 +67,7 @@ class Stamps:
         if self.has_halves:
             matches = (pc.match_substring_regex(text, pattern) for pattern in (r"(?i)p\.?m", r"(?:^|[T ])12:"))
             after, noon = (pc.fill_null(match, False) for match in matches)
-            late = 12 * HOUR * (after.to_numpy().astype(float) - noon.to_numpy())
+            late = DAY / 2 * (after.to_numpy().astype(float) - noon.to_numpy())
             text = pc.replace_substring_regex(text, r"(?i)\s*[ap]\.?m\.?$", "")
         for pattern, iso in REWRITTEN[self.pattern]:
             text = pc.replace_substring_regex(text, pattern, iso)
