@@ -49,9 +49,13 @@ def read(path: Path, options: Options) -> Log:
     clock = None if has_x or dated or first.step is None else Clock(first.step, first.x0)
     warnings = [*filter(None, [_rounded(first)])] if clock else []
     new = (Channel(name, "s", derived=True) for name in elapsed)
+    facts = {tag: first.file.tags[tag] for tag in FOR_PEOPLE if first.file.tags.get(tag)}
+    mark = first.file.separator.decode()
+    delimiter = {"\t": "tab", ",": "comma", ";": "semicolon"}.get(mark, mark)
+    facts |= {"delimiter": delimiter, "X_Columns": first.file.x_columns, "segments": str(walk.file_segments)}
     log = LvmLog(
         path, "lvm", channels=(*written, *new), clock=clock, time=elapsed[0] if dated else X if has_x else "",
-        started=first.started, zone="local" if first.started else "", facts=_facts(first, walk), warnings=warnings,
+        started=first.started, zone="local" if first.started else "", facts=facts, warnings=warnings,
         options=options,
     )  # fmt: skip
     log.clocks = _own_clocks(log, walk, layouts)
@@ -94,10 +98,3 @@ def _rounded(layout: Layout) -> str:
         f"line {layout.line}: the sampling interval of {layout.step_written} s is rounded, so the clock may be "
         f"wrong by {STEP_ROUNDING / step:.2%}; set rate = ... [Hz] for this log in study.toml"
     )
-
-
-def _facts(layout: Layout, walk: Walk) -> dict[str, str]:
-    tags = {tag: layout.file.tags[tag] for tag in FOR_PEOPLE if layout.file.tags.get(tag)}
-    separator = layout.file.separator
-    delimiter = {b"\t": "tab", b",": "comma", b";": "semicolon"}.get(separator, separator.decode())
-    return tags | {"delimiter": delimiter, "X_Columns": layout.file.x_columns, "segments": str(walk.file_segments)}

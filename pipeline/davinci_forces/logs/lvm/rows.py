@@ -19,16 +19,11 @@ from davinci_forces.maths.arrays import Array
 MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
 MAX_COMMENTS = 1000
 MAX_REMARKS_OF_A_KIND = 5  # remarks that differ in numbers only; further ones are counted
-DIGITS = re.compile(r"\d+")
 
 
 @dataclass
 class LvmLog(Log):
-    """An opened LVM file.
-
-    A channel `elapsed` is derived if several file segments have a date.  It is the time since the start of the first
-    one: the start of the row's file segment plus x.
-    """
+    """An opened LVM file; `elapsed` is derived if several file segments have a date: time [s] since the first start."""
 
     options: Options = field(default_factory=Options)
     clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
@@ -71,7 +66,7 @@ class Reading:
 
     def say(self, remark: str) -> None:
         """Add a warning; after the first few that differ only in their numbers, the others are counted."""
-        kind = DIGITS.sub("#", remark)
+        kind = re.sub(r"\d+", "#", remark)
         self.kinds[kind] += 1
         if self.kinds[kind] <= MAX_REMARKS_OF_A_KIND:
             self.log.warnings.append(remark)
@@ -170,10 +165,7 @@ class Reading:
         self.last_x = x[-1]
 
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
-        """Compute the time [s] since the start of the first file segment, from the headers of a channel.
-
-        `before` rows of the run's first file segment precede the run.
-        """
+        """Compute the time [s] since the start of the first file segment, of which `before` rows precede the run."""
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
         samplings = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]

@@ -241,19 +241,14 @@ class Walk:
         if cells > layout.width:
             self.wide.setdefault(cells, self.line)
         elif cells < layout.width:
-            self._comment_of_row_before(separator, run)
+            if run.lines:  # a comment stands in the last channel in the first row of a write with one channel less
+                row, _, last = self._rows[-1].rpartition(separator)
+                if last and not NUMBER.fullmatch(last.strip()):
+                    run.comments.append((run.lines[-1], last))
+                    self._is_narrow(run.lines[-1])
+                    self._rows[-1] = row
             self._is_narrow(self.line)
         return line, cells
-
-    def _comment_of_row_before(self, separator: bytes, run: Run) -> None:
-        """Move a comment out of the last channel, where it stands in the first row of a write with one channel less."""
-        if not self._rows or not run.lines:
-            return
-        row, _, last = self._rows[-1].rpartition(separator)
-        if last and not NUMBER.fullmatch(last.strip()):
-            run.comments.append((run.lines[-1], last))
-            self._is_narrow(run.lines[-1])
-            self._rows[-1] = row
 
     def _is_narrow(self, line: int) -> None:
         self.narrow, self.first_narrow = self.narrow + 1, self.first_narrow or line
