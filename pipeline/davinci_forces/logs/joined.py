@@ -117,7 +117,6 @@ class Joined(Log):
 
 
 TimedBlock = tuple[Array, Block]  # times (N,) [s], and samples (N,) by the names of their channels
-TimedSamples = tuple[Array, Array]  # times (N,) [s], and samples (N, C)
 Refuse = Callable[[str], BadLog]
 
 
@@ -144,11 +143,11 @@ def align(
     Rows that are not between samples of every other clock are left out.  Raises BadLog if times do not increase, clocks
     do not overlap, or one is far slower.
     """
-    clock = _Rising("the positions", refuse)
+    clock = clocks.ClockStatistics()
     for t, block in timed:
         if not len(t):
             continue
-        clock.update(t)
+        _update(clock, t, "the positions", refuse)
         if not done.others:
             done.period = _period(t)
             done.others |= {name: Follower(name, source, done.period, refuse) for name, source in others.items()}
@@ -163,10 +162,11 @@ def align(
         done.left_out += int(np.count_nonzero(~keep))
         yield t[keep], {name: values[keep] for name, values in block.items()}
     if done.others and not done.kept:
-        spans = (f"that of {name} {follower.rising.span}" for name, follower in done.others.items())
+        compared = {"the positions runs": clock} | {name: follower.clock for name, follower in done.others.items()}
+        spans = [f"of {whose} from {c.first:.6g} to {c.last:.6g} s" for whose, c in compared.items()]
         raise refuse(
-            f"the clock of the positions runs {clock.span}, {', '.join(spans)}: they do not overlap; record them "
-            "together, or leave out the channels of one"
+            f"the clock {', that '.join(spans)}: they do not overlap; record them together, or leave out the channels "
+            "of one"
         )
 
 
@@ -174,37 +174,25 @@ def _period(t: Array) -> float:
     return float(np.median(np.diff(t))) if len(t) > 1 else 0.0
 
 
-@dataclass
-class _Rising:
-    whose: str
-    refuse: Refuse
-    statistics: clocks.ClockStatistics = field(default_factory=clocks.ClockStatistics)
-
-    def update(self, t: Array) -> None:
-        """Check the next times."""
-        clock = self.statistics
-        if not np.isfinite(t).all():
-            row = clock.samples + int(np.flatnonzero(~np.isfinite(t))[0])
-            raise self.refuse(f"the time of {self.whose} is not finite at row {row} (counted from 0); record it again")
-        clock.update(t)
-        if clock.backward or clock.repeated:
-            raise self.refuse(
-                f"the time of {self.whose} does not increase at row {clock.bad_row} (counted from 0): "
-                f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; leave these channels out, or set "
-                "rate = ... [Hz] to count samples instead"
-            )
-
-    @property
-    def span(self) -> str:
-        """The time span that was read so far, as text."""
-        return f"from {self.statistics.first:.6g} to {self.statistics.last:.6g} s"
+def _update(clock: clocks.ClockStatistics, t: Array, whose: str, refuse: Refuse) -> None:
+    """Add the next times to a clock, which must be finite and increase."""
+    if not np.isfinite(t).all():
+        row = clock.samples + int(np.flatnonzero(~np.isfinite(t))[0])
+        raise refuse(f"the time of {whose} is not finite at row {row} (counted from 0); record it again")
+    clock.update(t)
+    if clock.backward or clock.repeated:
+        raise refuse(
+            f"the time of {whose} does not increase at row {clock.bad_row} (counted from 0): "
+            f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; leave these channels out, or set "
+            "rate = ... [Hz] to count samples instead"
+        )
 
 
 class Follower:
     """Channels of another clock, interpolated to requested times; keeps only the samples around them."""
 
     def __init__(self, name: str, source: Iterator[TimedBlock], period: float, refuse: Refuse) -> None:
-        self.source, self.rising = source, _Rising(name, refuse)
+        self.name, self.source, self.refuse, self.clock = name, source, refuse, clocks.ClockStatistics()
         self.names: list[str] = []
         self.interpolated = 0  # interpolated rows
         self.ended = False
@@ -243,7 +231,7 @@ class Follower:
         following = next((timed for timed in self.source if len(timed[0])), None)
         self.ended = following is None
         if following:
-            self.rising.update(following[0])
+            _update(self.clock, following[0], self.name, self.refuse)
         return following
 
     def _take(self, timed: TimedBlock | None) -> None:
@@ -255,8 +243,8 @@ class Follower:
             t, x = self._lowpassed(t, x)
         self.t, self.x = np.concatenate((self.t, t)), np.concatenate((self.x.reshape(-1, x.shape[1]), x))
 
-    def _lowpassed(self, t: Array, x: Array) -> TimedSamples:
-        """Low-pass the samples that wait and are followed by enough others, or by the end, between gaps."""
+    def _lowpassed(self, t: Array, x: Array) -> tuple[Array, Array]:
+        """Low-pass the samples (N, C) that wait and are followed by enough others, or by the end, between gaps."""
         before_t, before_x, done = self.waiting
         t, x = np.concatenate((before_t, t)), np.concatenate((before_x.reshape(-1, x.shape[1]), x))
         reach = clocks.half_width(self.ratio)

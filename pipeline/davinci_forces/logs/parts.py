@@ -147,15 +147,16 @@ def starts_of(parts: Sequence[Log]) -> list[datetime]:
 
 
 def _require_order(parts: Sequence[Log], starts: Sequence[datetime]) -> None:
-    if all(before <= after for before, after in pairwise(starts)):
-        return
-    right = sorted(range(len(parts)), key=lambda i: starts[i])
-    names = ", ".join(f'"{parts[i].path.name}"' for i in right)
-    wrong = next(i for i, (before, after) in enumerate(pairwise(starts), start=1) if after < before)
-    raise BadLog(
-        f"{parts[wrong].path}: it started at {parts[wrong].started}, earlier than {parts[wrong - 1].path.name}, "
-        f"which started at {parts[wrong - 1].started}; list the parts in this order: files = [{names}]"
-    )
+    for (part, start), (following, later) in pairwise(
+        zip(parts, starts, strict=False)
+    ):  # none where starts are unknown
+        if later < start:
+            right = sorted(range(len(parts)), key=lambda i: starts[i])
+            names = ", ".join(f'"{parts[i].path.name}"' for i in right)
+            raise following.bad(
+                f"it started at {following.started}, earlier than {part.path.name}, which started at {part.started}; "
+                f"list the parts in this order: files = [{names}]"
+            )
 
 
 @dataclass
