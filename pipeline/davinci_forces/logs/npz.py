@@ -1,7 +1,4 @@
-"""NumPy's files: an array (.npy), or several by name (.npz); fields of records and columns of matrices are channels.
-
-They are read piece by piece, without pickle.
-"""
+"""NumPy's files, read piece by piece and without pickle: an array (.npy), or several arrays by name (.npz)."""
 
 import math
 import zipfile
@@ -21,14 +18,13 @@ from davinci_forces.logs.arrays import ArrayLog, NamedArray, take_in
 from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 
-NPY = b"\x93NUMPY"
 MAX_MEMBERS = 1000
 read = partial(isolated.read, reader=__name__)
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether it begins as an array, or is a zip file whose first member is one."""
-    return head.startswith(NPY) or (head.startswith(b"PK") and b".npy" in head[30:542])
+    return head.startswith(npy.MAGIC_PREFIX) or (head.startswith(b"PK") and b".npy" in head[30:542])
 
 
 def open_in_child(path: Path) -> Log:

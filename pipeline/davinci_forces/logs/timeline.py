@@ -34,10 +34,7 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Append samples, which begin at `start` [s]; None means directly after the last sample.
-
-        A new part begins if the samples do not follow the last one directly, or if their sampling time is another.
-        """
+        """Append samples from `start` [s] on (None: after the last), as a new part unless these continue the last."""
         due = self.start[-1] + (self.rows - self.first[-1]) * self.step[-1] if self.first else 0.0
         continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not continues or step != self.step[-1]:

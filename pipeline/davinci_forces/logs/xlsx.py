@@ -75,10 +75,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _head(rows: Iterator[Row]) -> tuple[list[str], list[str], int, Row] | None:
-    """Find the names of the columns, their units, the number of rows above the samples, and the first of these.
-
-    The names stand directly above the first row with a number, or above a row of units.
-    """
+    """Find names and units of columns right above the first row with a number, the number of that row, and the row."""
     above: list[Row] = []
     for number, row in enumerate(rows):
         if not any(_is_number(value) or isinstance(value, date) for value in row):

@@ -5,10 +5,9 @@ from pathlib import Path
 
 from davinci_forces.logs import isolated
 
-ARROW_BEGINNINGS = (b"PAR1", b"ARROW1\0\0")
 read = partial(isolated.read, reader="davinci_forces.logs.arrow.table")
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file begins as one of these formats."""
-    return head.startswith(ARROW_BEGINNINGS)
+    return head.startswith((b"PAR1", b"ARROW1\0\0"))

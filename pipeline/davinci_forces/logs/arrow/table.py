@@ -19,13 +19,12 @@ from davinci_forces.logs.timeline import UNIX_EPOCH, moment
 from davinci_forces.maths.arrays import Array
 
 BATCH_ROWS = 1 << 14  # rows of a batch
-BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
 MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, above which it is mapped instead of read into memory
-PARQUET = {"pre_buffer": False, "buffer_size": BUFFER, "page_checksum_verification": True}  # else it holds row groups
+# A buffer [bytes] of each column of Parquet is read at a time; otherwise whole row groups are held.
+PARQUET = {"pre_buffer": False, "buffer_size": 1 << 18, "page_checksum_verification": True}
 LISTS = (pa.types.is_fixed_size_list, pa.types.is_list, pa.types.is_large_list)
 EPISODES = ("timestamp", "episode_index")  # columns of LeRobot: times [s] that begin anew, and the episode's number
 EPISODE_GAP = 1.0  # [s] between episodes: longer than any sampling time of a robot, so that none is joined to the next
-UNIT_KEYS = (b"unit", b"units")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
@@ -90,7 +89,7 @@ def _unit(column: pa.Field) -> str:
     if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
         return "s"
     metadata = column.metadata or {}
-    return next((metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if metadata.get(key)), "")
+    return next((metadata[key].decode("utf-8", "replace") for key in (b"unit", b"units") if metadata.get(key)), "")
 
 
 def _kind(what: pa.DataType) -> str:

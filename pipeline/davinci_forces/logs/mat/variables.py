@@ -31,20 +31,19 @@ def open_in_child(path: Path) -> Log:
     header = head[:116].split(b"\0")[0].decode("ascii", "replace").strip() if head.startswith(b"MATLAB") else ""
     if header:
         log.facts["header"] = header
-    arrays = list(_of_hdf5(path, log) if header.startswith("MATLAB 7.3") else _of_matlab(path, log))
+    if header.startswith("MATLAB 7.3"):
+        import h5py
+
+        from davinci_forces.logs.hdf5.datasets import arrays_of
+
+        arrays = list(arrays_of(h5py.File(path, "r", locking=False), log))
+    else:
+        arrays = list(_of_matlab(path, log))
     take_in(log, with_clocks(arrays, log.facts))
     if not log.channels:
         names = "; ".join([", ".join(array.name for array in arrays) or "nothing that is read", *log.warnings])
         raise BadLog(f"{path}: it holds no variable of samples; it has {names}")
     return log
-
-
-def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
-    import h5py
-
-    from davinci_forces.logs.hdf5.datasets import arrays_of
-
-    yield from arrays_of(h5py.File(path, "r", locking=False), log)
 
 
 def _of_matlab(path: Path, log: Log) -> Iterator[NamedArray]:
