@@ -6,37 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.logs.log import Channel, Log
+from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.unexplained import smoothed_course
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures, size
 from davinci_forces.robots.robot import Robot
-from davinci_forces.study.holding import BY_NUMBER, POSITIONS, VELOCITIES, Holding, Meaning
-from davinci_forces.study.joint_names import AT_MOTOR, by_joint_names, with_one_effort
-from davinci_forces.study.names import (
-    IN_DEGREES,
-    PROCESSED_WORDS,
-    SIGNAL_WORDS,
-    Numbered,
-    is_time,
-    joint_groups,
-    stated_unit,
-    symbol_of,
-    without_unit,
-    words_of,
-)
+from davinci_forces.study.holding import POSITIONS, VELOCITIES, Holding, Meaning
+from davinci_forces.study.joint_names import AT_MOTOR, by_joint_names, by_numbers, by_words
+from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
 
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 
 
 def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
-    """Guess what the channels of a log hold; the joints of `robots` may be named in it.
-
-    Raises BadLog where the log is damaged.
-    """
+    """Guess what the channels of a log hold, which may name joints of `robots`; raises BadLog where it is damaged."""
     numbers = [channel for channel in log.channels if channel.kind == "number" and not channel.derived]
     if not 0 < len(numbers) <= MAX_CHANNELS:
         return Holding()
@@ -45,7 +31,12 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     if not holding.is_complete:
         holding = max(by_numbers(numbers), by_words(numbers), key=lambda h: len(h.meanings))
     if holding.is_complete:
-        return _read_motion(log, holding)
+        times = [c.name for c in log.channels if c.kind != "text" and not c.derived and is_time(c)]
+        used = list(dict.fromkeys([*holding.meanings, *times, *([log.time] if log.time else [])]))
+        samples: dict[str, Array] = {}
+        for names in log.by_clock(used).values():
+            samples |= samples_of(log, names)
+        return with_motion(log, holding, samples)
     content = _by_content(log, [channel.name for channel in numbers if channel.name != log.time])
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
         return content
@@ -60,10 +51,7 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
 
 
 def clock_hint(log: Log) -> str:
-    """Propose the times of a log without a clock: a channel, or a rate by its velocities; "" where neither is found.
-
-    Raises BadLog where the log is damaged.
-    """
+    """Propose a channel, or a rate by velocities, as times of a log without any, else ""; raises BadLog at damage."""
     names = [channel.name for channel in log.channels if channel.kind == "number" and not channel.derived]
     if has_clock(log) or named_time(log) or not 0 < len(names) <= MAX_CHANNELS or len(log.by_clock(names)) > 1:
         return ""
@@ -75,55 +63,6 @@ def clock_hint(log: Log) -> str:
         rate = (len(t) - 1) / float(t[-1] - t[0])
         return f"time = {names[first]!r}, which increases throughout ({rate:.6g} Hz if it is in seconds)"
     return f"rate = {timing.rate!r}, {timing.reason}" if timing.rate else ""
-
-
-def by_numbers(channels: Sequence[Channel]) -> Holding:
-    """Assign joints by the number or label of a channel among those of one name: `q1`, `effort[outer_yaw]`."""
-    groups: dict[str, Numbered] = {}
-    for group in joint_groups(channels):
-        first_group = groups.setdefault(group.symbol, group)
-        if "motor" in group.words:  # of joints that are measured there alone
-            groups[group.symbol] = replace(first_group, names=group.names | first_group.names)
-    if "q" not in groups or not groups.keys() & {"tau", "i"}:
-        return Holding()
-    labels = [*groups["q"].names]
-    numbers = [int(label) for label in labels if label.isdecimal()]
-    first = min(numbers) if numbers and min(numbers) <= 1 else 0
-    units = {channel.name: stated_unit(channel) for channel in channels}
-    meanings: dict[str, Meaning] = {}
-    for symbol, group in groups.items():
-        usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(IN_DEGREES) & set(group.words) else ""
-        for label, name in group.names.items():
-            if label.isdecimal() and len(numbers) == len(labels):
-                joint, reason = int(label) - first, BY_NUMBER
-            elif label in labels:
-                joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
-            else:
-                continue
-            motor = AT_MOTOR.get(symbol, symbol) if "motor" in words_of(name) else symbol
-            meanings[name] = Meaning(motor, joint, reason, "" if units[name] else usual)
-    meanings = with_one_effort(meanings)
-    joints = 1 + max(meaning.joint for meaning in meanings.values())
-    return Holding(meanings, joints, () if numbers else tuple(labels))
-
-
-def by_words(channels: Sequence[Channel]) -> Holding:
-    """Assign joints by what names say beside the quantity, alike for positions and efforts: `base_pos`, `torqueA`."""
-    named: dict[str, dict[str, str]] = {}
-    for channel in channels:
-        words = words_of(without_unit(channel.name))
-        if not is_time(channel) and (symbol := symbol_of(words)):
-            label = "_".join(word for word in words if word not in SIGNAL_WORDS[symbol])
-            named.setdefault(symbol, {}).setdefault(label, channel.name)
-    labels = [*named.get("q", ())]
-    alike = any(set(named.get(effort, ())) == set(labels) for effort in ("tau", "i"))
-    if len(labels) < 2 or not alike or {*PROCESSED_WORDS} & {word for label in labels for word in label.split("_")}:
-        return Holding()
-    meanings = {
-        name: Meaning(symbol, labels.index(label), f"joint {label!r}")
-        for symbol, names in named.items() for label, name in names.items() if label in labels
-    }  # fmt: skip
-    return Holding(with_one_effort(meanings), len(labels), tuple(labels))
 
 
 def _by_content(log: Log, names: Sequence[str]) -> Holding:
@@ -149,16 +88,6 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
     effort = "i" if is_current else "tau"
     meanings |= {name: Meaning(effort, k, why_effort) for k, name in enumerate(signals[2 * n : 3 * n])}
     return with_motion(log, Holding(meanings, n), samples, unnamed=True)
-
-
-def _read_motion(log: Log, holding: Holding) -> Holding:
-    """Read the motion of the joints of a log, and add it to what its channels hold."""
-    names = [*holding.meanings, *(c.name for c in log.channels if c.kind != "text" and not c.derived and is_time(c))]
-    names += [log.time] if log.time else []
-    samples: dict[str, Array] = {}
-    for channels in log.by_clock(list(dict.fromkeys(names))).values():
-        samples |= samples_of(log, channels)
-    return with_motion(log, holding, samples)
 
 
 def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: bool = False) -> Holding:

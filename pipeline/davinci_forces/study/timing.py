@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +51,7 @@ class TimeGuess:
 
 
 def samples_of(log: Log, names: Sequence[str]) -> dict[str, Array]:
-    """Read the first samples of these channels of one clock, without the last rows that a channel lacks.
-
-    Raises BadLog where the log is damaged.
-    """
+    """Read the first samples of channels of one clock, up to the last complete row; raises BadLog at damage."""
     parts: dict[str, list[Array]] = {name: [] for name in names}
     rows = 0
     for block in log.blocks(list(names)):
@@ -150,29 +147,27 @@ def _timing_by(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]],
     name = next((name for name, s in SIZES.items() if s == seconds), "")
     what = f"{shape} ({rate:.6g} Hz if it is in seconds)" if unnamed and not how else f"{shape}, {rate:.6g} Hz"
     timing = TimeGuess(channel.name, seconds, what + (f"; in {name}{how}" if how else ""), step=_step(t) * seconds)
-    return _timing_agreed(timing, slope and slope._replace(ratio=slope.ratio * seconds), rate, channel.name)
+    units, fitted = _compared(slope and slope._replace(ratio=slope.ratio * seconds), rate)
+    if not fitted:
+        return replace(timing, units=units)
+    clash = f"by {channel.name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
+    return TimeGuess(missing=f"{clash}: write rate = {fitted:g}, or time = {channel.name!r}", step=timing.step)
 
 
-def _timing_agreed(timing: TimeGuess, slope: VelocityRatio | None, rate: float, name: str) -> TimeGuess:
-    """Times as they are where velocities agree; in degrees what that explains; else no times, and both rates said."""
+def _compared(slope: VelocityRatio | None, rate: float) -> tuple[tuple[tuple[str, str], ...], float]:
+    """The units in degrees that explain a ratio other than 1, or, if none does, the rate [Hz] by the velocities."""
     if slope is None or slope.agrees(1.0):
-        return timing
+        return (), 0.0
     units = tuple(key for key, ratio in RATIOS.items() if slope.agrees(ratio))
-    if units:
-        return TimeGuess(**vars(timing) | {"units": units})
-    fitted = columns.round_rate(slope.ratio * rate)
-    clash = f"by {name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
-    return TimeGuess(missing=f"{clash}: write rate = {fitted:g}, or time = {name!r}", step=timing.step)
+    return units, 0.0 if units else columns.round_rate(slope.ratio * rate)
 
 
 def _timing_of_format(log: Log, samples: Mapping[str, Array], slope: VelocityRatio | None) -> TimeGuess:
     """The clock of a format, with a remark where the velocities tell another rate."""
     t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
     step = log.clock.step if log.clock else _step(t) if len(t) > 1 else 0.0
-    if not step or slope is None or slope.agrees(1 / step):
-        return TimeGuess(step=step)
-    fitted = columns.round_rate(slope.ratio)
-    if unit := next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None):
-        return TimeGuess(step=step, units=(unit,))
+    if not step:
+        return TimeGuess()
+    units, fitted = _compared(slope and slope._replace(ratio=slope.ratio * step), 1 / step)
     remark = f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {fitted:g} Hz"
-    return TimeGuess(step=step, remark=remark)
+    return TimeGuess(step=step, units=units, remark=remark if fitted else "")
