@@ -50,11 +50,11 @@ class Channels:
         sources = [self.source(quantity, keys, value) for quantity, keys, value in _flat(values)]
         valid = tuple(s for s in sources if s)
         if self.robot and len(valid) == len(sources):
-            self.complete(valid)
+            self.complete(valid, self.robot)
         return valid
 
-    def complete(self, sources: tuple[Source, ...]) -> None:
-        """Check that every joint has one position and one effort, and every vector all of its components or none."""
+    def complete(self, sources: tuple[Source, ...], robot: Robot) -> None:
+        """Check that joints have a position and an effort, a vector all components, and tissue a depth and a force."""
         for joint in dict.fromkeys(s.joint for s in sources if s.joint):
             has = {s.symbol for s in sources if s.joint == joint}
             for (first, second), needed in ALTERNATIVES:
@@ -67,19 +67,11 @@ class Channels:
             missing = [name for name in names if name not in quantities]
             if missing and len(missing) < len(names):
                 self.log.problem(f"{', '.join(names)} belong together; give {' and '.join(missing)}, too")
-        if self.log.values.get("role") == "tissue":
-            self.complete_tissue(sources)
-
-    def complete_tissue(self, sources: tuple[Source, ...]) -> None:
-        """Check that a tissue log has a depth and a force, as channels or by a prismatic joint."""
-        assert self.robot is not None
-        has = {s.quantity for s in sources}
-        if any(self.robot.joint(s.joint).kind is Kind.PRISMATIC for s in sources if s.joint):
-            return
-        for what, scalar, all_of in (("depth", "depth", TIP), ("force", "force", FORCE)):
-            if scalar not in has and not has & set(all_of):
-                either = f"{scalar}, or {', '.join(all_of)}, or the position of a prismatic joint"
-                self.log.problem(f"a tissue log needs a {what}; give {either}")
+        slides = any(robot.joint(s.joint).kind is Kind.PRISMATIC for s in sources if s.joint)
+        for scalar, names in (("depth", TIP), ("force", FORCE)):
+            if self.log.values.get("role") == "tissue" and not slides and not quantities & {scalar, *names}:
+                either = f"{scalar}, or {', '.join(names)}, or the position of a prismatic joint"
+                self.log.problem(f"a tissue log needs a {scalar}; give {either}")
 
     def source(self, quantity: str, keys: tuple[str, ...], value: Any) -> Source | None:
         """Read the channel of one quantity: a name, a number, or a table with more properties."""

@@ -66,7 +66,11 @@ def is_inside(file: str) -> bool:
 
 
 def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) -> LogEntry:
-    name = _name(study, index, table)
+    if "name" not in table:
+        study.problem(f"log {index + 1} has no name", "log", index)
+    name = table.text("name", f"log-{index + 1}")
+    if wrong := wrong_name(name):
+        study.problem(f"log name {wrong}", "log", index, "name")
     table.place = f"log {name!r}"
     entry = LogEntry(
         name, _files(table), table.text("role", choices=ROLES), Channels(table, robot).read(), "join" in table,
@@ -77,15 +81,6 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
     )  # fmt: skip
     table.close()  # reports unknown keys
     return entry
-
-
-def _name(study: TomlTable, index: int, table: TomlTable) -> str:
-    if "name" not in table:
-        study.problem(f"log {index + 1} has no name", "log", index)
-    name = table.text("name", f"log-{index + 1}")
-    if wrong := wrong_name(name):
-        study.problem(f"log name {wrong}", "log", index, "name")
-    return name
 
 
 def _files(table: TomlTable) -> tuple[str, ...]:

@@ -33,8 +33,7 @@ OUTDATED_SETTINGS = ("derivative",)  # settings without effect that earlier vers
 def read(folder: Path) -> Study:
     """Read and validate `folder/study.toml`; `Study.absent` lists logs that do not exist.
 
-    Raises BadStudy with every problem of the file and of the robot's file, one a line, and then every log that does not
-    exist.
+    Raises BadStudy with every problem of the file and of the robot's file, one a line, and then every absent log.
     """
     missing = "there is no such file; `davinci-forces new` writes one from a log"
     return study_of(toml.read(folder / "study.toml", BadStudy, missing), folder)
@@ -60,7 +59,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     baseline = _baseline(table, folder)
     logs = entries_of(table, robot)
-    remarks = (*_outdated(table.table("settings")), *_weightless(table, logs))
+    remarks = tuple(_remarks(table, logs))
     table.close()
     lines = lines_of_files(table, logs)
     if table.file.problems():
@@ -157,8 +156,11 @@ def _with_base(robot: Robot | None, base: TomlTable) -> Robot | None:
     return robot.with_base((rpy[0], rpy[1], rpy[2])) if robot and rpy else robot
 
 
-def _weightless(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
-    """Yield a warning, with its line, for each log of role weight that does not state where its mass hangs."""
+def _remarks(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
+    """Yield a warning, with its line, for each outdated setting, and for each log of role weight without its mass."""
+    for name in table.table("settings").values.keys() & {*OUTDATED_SETTINGS}:
+        line = table.file.line(("settings", name))
+        yield f"{table.file.name}:{line}: the setting {name!r} no longer has an effect; remove it"
     for i, log in enumerate(logs):
         if log.role == "weight" and log.weight is None:
             yield (
@@ -166,16 +168,6 @@ def _weightless(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
                 "no weight, so no mass is estimated; write weight = { mass = <kg, if known> } for a mass at the tip, "
                 'and with moves_with = "<joint>", position = [x, y, z] in metres from the remote centre for another'
             )
-
-
-def _outdated(settings: TomlTable) -> Iterator[str]:
-    """Yield a warning, with its line, for each outdated setting that the file gives."""
-    yield from (
-        f"{settings.file.name}:{settings.file.line((*settings.path, name))}: the setting {name!r} no longer has an "
-        "effect; remove it"
-        for name in OUTDATED_SETTINGS
-        if name in settings.values
-    )
 
 
 def settings_of(table: TomlTable, robot: Robot | None) -> Settings:
