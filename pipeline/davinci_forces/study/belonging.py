@@ -1,7 +1,4 @@
-"""Guess which files hold signals of one recording, and which robot was recorded.
-
-The robot follows from the number of joints and the ranges of their positions; a robot.toml is written if none fits.
-"""
+"""Guess which files hold one recording, and by the names, number and ranges of its joints, which robot was recorded."""
 
 import math
 import re
@@ -36,8 +33,6 @@ MAX_TURN = 1.6  # [rad] within which the hand turns
 DAVINCI_WORDS = ("davinci", "dvrk", "psm")
 OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
 MAX_ANGLE_DRIVE = 6.6  # [rad] just over a turn either way; a drive that turns farther may be in degrees
-OTHERS_JOINT = "which joint it is: taken is that of the other logs"
-UNCLEAR_JOINT = "which joint it is, as other logs are of more than one"
 HARMONICS = 12  # more than an excitation usually has: too few distort the motion, too many keep a little noise
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
 OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
@@ -53,10 +48,7 @@ class Arm(NamedTuple):
 
 
 def candidates(folder: Path) -> tuple[list[Arm], list[str]]:
-    """The robots whose joints the channels of logs may name: those described beside the logs, then the listed ones.
-
-    Also why each file beside the logs is not taken, if none has the joints of the logs.
-    """
+    """The robots described beside the logs, then the listed ones; and why each file is not taken, if none fits."""
     arms, why_not = [], []
     for file in sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")]):
         if file.name in ("study.toml", "review.toml"):
@@ -80,21 +72,19 @@ def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms
     """
     numbers = [int(found[1]) for name in names for found in JOINT_NUMBER.finditer(name)]
     robots, first = [arm.robot for arm in arms], 0 if 0 in numbers else 1
-    untold = [holding.joints == 1 and not holding.has_named_joints for holding in holdings]
-    assigned = [
-        by_file_name(holding, name, robots, first) if lone else holding
-        for holding, name, lone in zip(holdings, names, untold, strict=True)
-    ]
-    unnamed = [lone and not holding.has_named_joints for holding, lone in zip(assigned, untold, strict=True)]
-    by_name = [i for i, lone in enumerate(untold) if lone and not unnamed[i]]
-    named = [assigned[i] for i in by_name]
-    joints = {(of.robot.name if of.robot else "", frozenset(of.joints_with())) for of in named}
+    untold = [i for i, holding in enumerate(holdings) if holding.joints == 1 and not holding.has_named_joints]
+    assigned = [*holdings]
+    for i in untold:
+        assigned[i] = by_file_name(holdings[i], names[i], robots, first)
+    named = [i for i in untold if assigned[i].has_named_joints]
+    joints = {(of.robot.name if of.robot else "", frozenset(of.joints_with())) for of in (assigned[i] for i in named)}
     several = any(holding.joints > 1 for holding in assigned)
-    for i in (i for i, lone in enumerate(unnamed) if lone):
+    for i in (i for i in untold if i not in named):
         if len(joints) == 1:  # the words of that name tell the joint of the others, too
-            assigned[i] = by_file_name(assigned[i], names[by_name[0]], robots, first).to_check(OTHERS_JOINT)
+            taken = by_file_name(assigned[i], names[named[0]], robots, first)
+            assigned[i] = taken.to_check("which joint it is: taken is that of the other logs")
         elif several:
-            assigned[i] = assigned[i].to_check(UNCLEAR_JOINT)
+            assigned[i] = assigned[i].to_check("which joint it is, as other logs are of more than one")
     return assigned
 
 
@@ -142,11 +132,8 @@ def arm_of(
 
 
 def _is_davinci(holding: Holding, is_named: bool) -> bool:
-    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third may slide.
-
-    Three joints are as many as it has. More may be of any arm, unless names say which.
-    """
-    counts = POSITION_COUNTS if is_named else POSITION_COUNTS[:1]
+    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third may slide."""
+    counts = POSITION_COUNTS if is_named else POSITION_COUNTS[:1]  # more than its three joints may be of any arm
     if holding.joints not in counts or not {0, 1, 2} <= holding.ranges.keys():
         return False
     if any(m.joint == 2 and is_angle(holding.units.get(name, "")) for name, m in holding.meanings.items()):
@@ -174,10 +161,7 @@ def _prismatic(holdings: Sequence[Holding]) -> set[int]:
 
 
 def _limits(holdings: Sequence[Holding]) -> dict[int, str]:
-    """The ranges of position and velocity of the joints that move, rounded outwards, as values of TOML.
-
-    An angle that may be in degrees, or is the motor's, has none.
-    """
+    """The ranges of the joints that move, rounded outwards in TOML; none of angles of motors or perhaps in degrees."""
     courses: dict[int, list[Course]] = {}
     for holding in holdings:
         at_motor = {meaning.joint for meaning in holding.meanings.values() if meaning.symbol == "theta_m"}

@@ -73,7 +73,13 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
             )
     stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
     arms, why_not = (stated, []) if stated else belonging.candidates(folder)
-    drawn, refused = _read(belonging.group_recordings(files), [arm.robot for arm in arms])
+    drawn: list[DraftLog] = []
+    refused: dict[Path, str] = {}
+    for members in belonging.group_recordings(files):
+        try:
+            drawn.append(_draft_log(members, [arm.robot for arm in arms]))
+        except (BadLog, OSError) as why:
+            refused[members[0]] = str(why)
     if not drawn:
         what = "no log can be read, so no study is written; do what each line says, or name other files"
         raise BadLog("\n".join([*refused.values(), what]))
@@ -86,34 +92,23 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     arm = stated[0] if stated else belonging.arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
     drawn = _named_as(arm.robot, drawn)
     named = [*_distinct(drawn)]
-    roles = roles_of([_recording(draft, name, folder, arm.robot) for draft, name in named])
+    roles = roles_of([_evidence(draft, name, folder, arm.robot) for draft, name in named])
     blocks, rows = [], []
     for (draft, name), role in zip(named, roles, strict=True):
         tare = "" if role.tare is None else named[role.tare][1]
         writer = LogTable(draft, name, folder, arm.robot, role, tare)
         blocks += writer.lines()
         rows.append(writer.row())
-    for file, why in refused.items():
-        blocks += ["", f"# {paths_in([file], folder)[0]}: left out: {why}"]
-        rows.append(Row(paths_in([file], folder)[0], "-", "-", "-", f"left out: {why}"))
+    for file, reason in refused.items():
+        [path] = paths_in([file], folder)
+        blocks += ["", f"# {path}: left out: {reason}"]
+        rows.append(Row(path, "-", "-", "-", f"left out: {reason}"))
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
     by_current = [] if arm.name.endswith(".urdf") else _joints_by_current(arm.robot, drawn)  # a URDF states no drives
     assumed = [joint.name for joint in by_current if not joint.effort]
     drives = f"[robot_overrides] of study.toml, where those of {arm.name} are"
     remark = f"check gear_ratio and torque_constant of {', '.join(assumed)} in {drives}" if assumed else ""
     return Draft(text, arm, tuple(rows), remark)
-
-
-def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
-    """Open recordings and guess their content; the reasons of those that cannot be read, by file."""
-    drawn: list[DraftLog] = []
-    refused: dict[Path, str] = {}
-    for members in groups:
-        try:
-            drawn.append(_draft_log(members, listed))
-        except (BadLog, OSError) as why:
-            refused[members[0]] = str(why)
-    return drawn, refused
 
 
 def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
@@ -131,7 +126,7 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) else {})
 
 
-def _recording(draft: DraftLog, name: str, folder: Path, robot: Robot) -> Evidence:
+def _evidence(draft: DraftLog, name: str, folder: Path, robot: Robot) -> Evidence:
     path = draft.files[0].resolve().relative_to(folder.resolve())
     moving = [robot.joints[k].kind for k in draft.guess.moving if k < len(robot.joints)]
     text = (path.parent / draft.files[0].name.partition(".")[0]).as_posix()

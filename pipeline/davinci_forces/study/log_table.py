@@ -41,16 +41,13 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class DraftLog:
-    """One [[log]]: its files, the opened log, the guess of its channels, and the quantities of its pushes by channel.
-
-    Beside joints, the quantities are those of a force sensor, in `sensor`.
-    """
+    """One [[log]]: its files, the opened log, the guess of its channels, quantities of pushes by channel."""
 
     files: list[Path]
     log: Log
     guess: Holding
     touching: dict[str, str]
-    sensor: dict[str, str] = field(default_factory=dict)
+    sensor: dict[str, str] = field(default_factory=dict)  # quantities of a force sensor beside joints, by channel
 
     @property
     def name(self) -> str:
@@ -242,12 +239,9 @@ class LogTable:
 
 
 def _fitting(meaning: Meaning, joint: Joint, hides_unit: bool) -> str:
-    """The unit in a channel's name, if it measures the quantity; a velocity called deg is in deg/s.
-
-    `hides_unit`: the log takes a label for the unit, so that the unit has to be stated.
-    """
+    """The unit in a channel's name, if it measures the quantity; a velocity called deg is in deg/s."""
     needed = kind_of_unit(joint, meaning.symbol)
-    units = (meaning.unit, f"{meaning.unit}/s", SI[needed] if hides_unit else "")
+    units = (meaning.unit, f"{meaning.unit}/s", SI[needed] if hides_unit else "")  # stated where a label seems a unit
     return next((unit for unit in units if measures(unit) == needed), "")
 
 
