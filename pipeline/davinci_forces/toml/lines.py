@@ -106,7 +106,7 @@ def excess(text: str) -> str:
 
 def lines_of(text: str) -> dict[KeyPath, int]:
     """The line, from 1, of every table, key and element of a list; `text` is valid for tomllib."""
-    return _Scanner(text).scan()
+    return _Scanner(text).lines
 
 
 def _tokens(text: str) -> Iterator[tuple[int, str]]:
@@ -130,15 +130,12 @@ class _Scanner:
         self.next = next(self.left, NOTHING)
         self.lines: dict[KeyPath, int] = {(): 1}
         self.last: dict[KeyPath, int] = {}  # of [[lists]]: the number of the latest table
-
-    def scan(self) -> dict[KeyPath, int]:
         table: KeyPath = ()
         while self.next is not NOTHING:
             if self.skip_mark("["):
                 table = self.header()
             else:
                 self.pair(table)
-        return self.lines
 
     def skip_mark(self, mark: str) -> bool:
         """Take a mark if it is the next token, and return whether it was."""

@@ -191,10 +191,7 @@ class TomlTable:
         return [(key, self.table(key)) for key in self.values]
 
     def tables(self, key: str, none: str = "", most: int = 1000) -> list["TomlTable"]:
-        """The tables of a list, such as [[log]]; if there are none, `none` is the problem to note, or "".
-
-        More than `most` tables are also a problem, and the tables beyond `most` are left out.
-        """
+        """The tables of a list, as [[log]], at most so many; if there are none, `none` is the problem to note."""
         expected = f"a list of tables: write [[{key}]]"
         entries = self.take(key, [], (list,), expected, lambda value: all(isinstance(entry, dict) for entry in value))
         if none and self.values.get(key, []) == []:
@@ -254,10 +251,7 @@ TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read. Is it a log?
 
 
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
-    """Read the whole of a file; its values are checked when they are taken from the table.
-
-    Raises an error of that kind if the file cannot be read or is not TOML.
-    """
+    """Read a file, whose values are checked when they are taken; raises an error of that kind if it cannot."""
     try:
         text = text_of(read_bytes(file, MAX_BYTES, TOO_LARGE), "utf-8-sig")
     except FileNotFoundError:
