@@ -82,42 +82,40 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
         first, options = first + 1, replace(options, header=True)
     header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, options)
     whole = [row for line in lines[first:] if len(row := split_cells(line, delimiter)) == len(kinds)]
-    counted_from = {i: stamp.from_first([row[i] for row in whole]) for i, stamp in stamps.items()}
-    stamps = {i: stamp for i, stamp in counted_from.items() if stamp}  # a column without a valid first date is text
+    from_first = {i: stamp.from_first([row[i] for row in whole]) for i, stamp in stamps.items()}
+    stamps = {i: stamp for i, stamp in from_first.items() if stamp}  # a column without a valid first date is text
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
-    unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := _why_text(columns[i]))}
-    unitless = [i for i, kind in enumerate(kinds) if kind == "number" and not header.units[i]]
-    counted = {i: unit for i in unitless if (unit := _counted_unit(columns[i]))}
-    units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
-    aliases = [
-        of_joint or alias for of_joint, alias in zip(_of_joints(header.names, columns), header.aliases, strict=True)
-    ]
-    described = zip(unique(header.names), units, kinds, aliases, strict=True)
+    stated = zip(header.units, columns, kinds, strict=True)
+    units = [unit or (_counted_unit(column) if kind == "number" else "") for unit, column, kind in stated]
+    described = zip(unique(header.names), units, kinds, _aliases(header, columns), strict=True)
     channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
     renamed = (
         f"more than one column is called {written!r}; column {i} is read as {channel.name!r}"
         for i, (written, channel) in enumerate(zip(header.names, channels, strict=True))
         if written and written != channel.name
     )
-    remarks = {i: f"column {i} ({channels[i].name}) {remark}" for i, remark in unread.items()}
+    unread = {
+        channel.name: f"column {i} ({channel.name}) {why}"
+        for i, channel in enumerate(channels)
+        if channel.kind == "text" and (why := _why_text(columns[i]))
+    }
     return Dialect(
         delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
         header_lines=frozenset(line.strip() for line in lines[:first] if line.strip()),
         names=tuple(header.names) if any(header.names) else (), preamble=tuple(header.preamble), framed=framed,
         quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])),
-        unread={channels[i].name: remarks[i] for i in unread},
-        remarks=(*renamed, *remarks.values()),
+        unread=unread, remarks=(*renamed, *unread.values()),
     )  # fmt: skip
 
 
-def _of_joints(names: Sequence[str], columns: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Aliases with the joint that another column names, as `rostopic echo -p` does: name0 holds that of position0."""
-    matches = [re.fullmatch(r"(|.*[./])(name|position|velocity|effort)(\d+)", name) for name in names]
+def _aliases(header: Header, columns: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Aliases, with the joint that another column names, as `rostopic echo -p` does: name0 holds that of position0."""
+    matches = [re.fullmatch(r"(|.*[./])(name|position|velocity|effort)(\d+)", name) for name in header.names]
     joints = {(m[1], m[3]): cells[0] for m, cells in zip(matches, columns, strict=True)
               if m and m[2] == "name" and len({*cells}) == 1}  # fmt: skip
-    for m in matches:
+    for m, alias in zip(matches, header.aliases, strict=True):
         joint = joints.get((m[1], m[3]), "") if m and m[2] != "name" else ""
-        yield f"{m[1]}{m[2]}[{joint}]" if m and joint else ""
+        yield f"{m[1]}{m[2]}[{joint}]" if m and joint else alias
 
 
 def _unfolded(lines: Sequence[str]) -> list[str]:
