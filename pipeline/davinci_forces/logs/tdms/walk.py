@@ -91,30 +91,23 @@ class Walk:
 
     def _stop(self, at: int, lead: bytes) -> None:
         size = self.size - at
+        what = f"no file segment begins here: the file is damaged; the last {size} bytes are not read"
         if not lead.strip(b"\0"):
-            self.say(f"byte {at}: {size} NUL bytes follow, typical of a power cut; they are not read")
+            what = f"{size} NUL bytes follow, typical of a power cut; they are not read"
         elif TAG.startswith(lead[:4]):
-            self.say(
-                f"byte {at}: the file is cut within the head of a file segment; its last {size} bytes are not read"
-            )
-        else:
-            self.say(f"byte {at}: no file segment begins here: the file is damaged; the last {size} bytes are not read")
+            what = f"the file is cut within the head of a file segment; its last {size} bytes are not read"
+        self.say(f"byte {at}: {what}")
 
     def _cut(self, at: int, data: int, length: int) -> int:
         """Find the end of a file segment of unknown or too large length: the next one, or the end of the file."""
         self.cut = True
         end = self._next_tag(data)
         where = "the end of the file" if end == self.size else f"the next file segment, at byte {end}"
+        short = at + LEAD_IN + length - end
+        what = f"the file segment that begins here lacks {short} bytes; whole samples up to {where} are kept"
         if length == UNKNOWN:
-            self.say(
-                f"byte {at}: the length of the file segment that begins here was never written; read up to {where}"
-            )
-        else:
-            short = at + LEAD_IN + length - end
-            self.say(
-                f"byte {at}: the file segment that begins here lacks {short} bytes; "
-                f"whole samples up to {where} are kept"
-            )
+            what = f"the length of the file segment that begins here was never written; read up to {where}"
+        self.say(f"byte {at}: {what}")
         return end
 
     def _next_tag(self, at: int) -> int:
@@ -157,7 +150,11 @@ class Walk:
             return
         interleaved = bool(toc & IS_INTERLEAVED) and DAQMX_RAW not in {samples.kind for samples in active.values()}
         self.layouts |= {"interleaved" if interleaved else "contiguous"} | ({"big-endian"} if order == ">" else set())
-        regions = list(_regions(active, order, interleaved, data, end - data, whole))
+        length = end - data
+        found = (
+            _interleaved(active, order, data, length) if interleaved else _chunks(active, order, data, length, whole)
+        )
+        regions = list(found)
         if more and len(regions) == 1 and stride <= BLOCK and (joined := _joined(regions[0], 1 + more, stride)):
             yield joined
             return
@@ -172,12 +169,7 @@ def read_at(file: BinaryIO, position: int, octets: int) -> bytes:
     return file.read(octets)
 
 
-def _regions(
-    active: dict[str, Samples], order: str, interleaved: bool, data: int, length: int, whole: bool
-) -> Iterator[Region]:
-    if interleaved:
-        yield from _interleaved(active, order, data, length)
-        return
+def _chunks(active: dict[str, Samples], order: str, data: int, length: int, whole: bool) -> Iterator[Region]:
     cards = {samples.widths: samples.count for samples in active.values() if samples.kind == DAQMX_RAW}
     size = sum(samples.octets for samples in active.values()) + sum(sum(w) * count for w, count in cards.items())
     chunks, remainder = divmod(length, size) if size else (0, 0)
