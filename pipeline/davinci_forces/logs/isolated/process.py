@@ -176,11 +176,24 @@ def serve() -> None:
 
 
 def _answer(request: Message, answers: IO[bytes]) -> None:
-    """Answer one request; errors in a library are answers, too."""
+    """Answer one request by the description of an opened log or by its blocks; errors in a library are answers, too."""
     _limit(request["memory"], request["cpu"])
     try:
-        for message, columns in _answers(request):
-            send(answers, message, columns)
+        path = Path(request["path"])
+        about = path.stat()
+        key = (request["reader"], path, about.st_mtime_ns, about.st_size)
+        if key not in _opened:
+            _opened.clear()
+            _opened[key] = import_module(request["reader"]).open_in_child(path)
+        log, names = _opened[key], request["names"]
+        if names is None:
+            send(answers, {name: getattr(log, name) for name in FIELDS})
+            return
+        for block in log.blocks(names):
+            send(answers, {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names])
+        send(
+            answers, {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}
+        )
     except BrokenPipeError:
         raise
     except BadLog as error:
@@ -196,23 +209,6 @@ def _answer(request: Message, answers: IO[bytes]) -> None:
     except Exception as error:
         _opened.clear()
         send(answers, {"bad": f"{request['path']}: it cannot be read ({type(error).__name__}: {error}): {REMEDY}"})
-
-
-def _answers(request: Message) -> Iterator[Answer]:
-    """Yield the description of an opened log, or its blocks."""
-    path = Path(request["path"])
-    about = path.stat()
-    key = (request["reader"], path, about.st_mtime_ns, about.st_size)
-    if key not in _opened:
-        _opened.clear()
-        _opened[key] = import_module(request["reader"]).open_in_child(path)
-    log, names = _opened[key], request["names"]
-    if names is None:
-        yield {name: getattr(log, name) for name in FIELDS}, []
-        return
-    for block in log.blocks(names):
-        yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
-    yield {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}, []
 
 
 def _limit(memory: int, seconds: float) -> None:

@@ -38,7 +38,10 @@ class Rosbag1(Scan):
         for fields, begin, end in self._records(content, self.at):
             kind = fields[b"op"][0]
             if kind == BAG_RECORD:
-                self._begin(fields)
+                if fields.get(b"encryptor"):
+                    raise BadLog(f"{self.path}: it is encrypted, which is not supported; decrypt it first")
+                self.index = int.from_bytes(fields[b"index_pos"], "little")
+                self.ends = (U32(fields[b"conn_count"])[0], U32(fields[b"chunk_count"])[0])
             elif kind == CHUNK:
                 self._scan_chunk(fields, content[begin:end], end <= len(content))
             elif kind == CHUNK_INFO:
@@ -76,12 +79,6 @@ class Rosbag1(Scan):
                 raise BadContent("a record ends beyond the file")
             yield fields, begin, end
             at = end
-
-    def _begin(self, fields: Fields) -> None:
-        if fields.get(b"encryptor"):
-            raise BadLog(f"{self.path}: it is encrypted, which is not supported; decrypt it first")
-        self.index = int.from_bytes(fields[b"index_pos"], "little")
-        self.ends = (U32(fields[b"conn_count"])[0], U32(fields[b"chunk_count"])[0])
 
     def _scan_chunk(self, fields: Fields, content: memoryview, whole: bool) -> None:
         self.chunk = len(self.chunks)
