@@ -147,9 +147,8 @@ def starts_of(parts: Sequence[Log]) -> list[datetime]:
 
 
 def _require_order(parts: Sequence[Log], starts: Sequence[datetime]) -> None:
-    for (part, start), (following, later) in pairwise(
-        zip(parts, starts, strict=False)
-    ):  # none where starts are unknown
+    started = zip(parts, starts, strict=False)  # empty where starts are unknown
+    for (part, start), (following, later) in pairwise(started):
         if later < start:
             right = sorted(range(len(parts)), key=lambda i: starts[i])
             names = ", ".join(f'"{parts[i].path.name}"' for i in right)

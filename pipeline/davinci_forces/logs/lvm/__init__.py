@@ -8,7 +8,7 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.lines import MARKS, Lines
 from davinci_forces.logs.log import BadContent, Channel, Clock, Log, Options, unique
 from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, Layout, X
-from davinci_forces.logs.lvm.rows import LvmLog, Reading
+from davinci_forces.logs.lvm.rows import LvmLog
 from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.timeline import OwnClock, equal_columns
 
@@ -74,8 +74,7 @@ def _own_clocks(log: LvmLog, walk: Walk, layouts: Sequence[Layout]) -> tuple[Own
     }  # fmt: skip
     groups = walk.groups
     if len(columns := [*dict.fromkeys(x_of.values())]) > 1:
-        aside = replace(log, warnings=[], comments=[], nulls=dict.fromkeys(columns, 0), nans=dict.fromkeys(columns, 0))
-        number = equal_columns(columns, Reading(aside, columns).blocks())
+        number = equal_columns(columns, log.independent_copy().blocks(columns))
         parts: dict[tuple[int, int], list[str]] = {}
         for i, group in enumerate(groups):
             for name in group:
