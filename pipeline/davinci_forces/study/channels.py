@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from davinci_forces.errors import BadRobot
@@ -35,77 +34,70 @@ AXES = ("x", "y", "z")
 TIP_WORDS = {"tip", "tool", "pos", "position", "end", "effector", "ee", "probe", "m", "mm", "um", *AXES}
 
 
-@dataclass(frozen=True)
-class Channels:
-    """Reads the channels of one log; `robot` is None where the study names none that is known."""
+def sources_of(log: TomlTable, robot: Robot | None) -> tuple[Source, ...]:
+    """Read the sources of a log whose quantities are valid; `robot` is None where the study names no known one."""
+    values = log.table("channels").values
+    if not values:
+        log.problem("[log.channels] must name the channel of each quantity", "channels")
+    sources = [_source(log, robot, quantity, keys, value) for quantity, keys, value in _flat(values)]
+    valid = tuple(s for s in sources if s)
+    if robot and len(valid) == len(sources):
+        _require_complete(log, robot, valid)
+    return valid
 
-    log: TomlTable
-    robot: Robot | None
 
-    def read(self) -> tuple[Source, ...]:
-        """Read the sources whose quantities are valid."""
-        values = self.log.table("channels").values
-        if not values:
-            self.log.problem("[log.channels] must name the channel of each quantity", "channels")
-        sources = [self.source(quantity, keys, value) for quantity, keys, value in _flat(values)]
-        valid = tuple(s for s in sources if s)
-        if self.robot and len(valid) == len(sources):
-            self.complete(valid, self.robot)
-        return valid
+def _require_complete(log: TomlTable, robot: Robot, sources: tuple[Source, ...]) -> None:
+    """Check that joints have a position and an effort, a vector all components, and tissue a depth and a force."""
+    for joint in dict.fromkeys(s.joint for s in sources if s.joint):
+        has = {s.symbol for s in sources if s.joint == joint}
+        for (first, second), needed in ALTERNATIVES:
+            if needed and not has & {first, second}:
+                log.problem(f"{joint} has no {needed}; give {joint}.{first} or {joint}.{second}")
+            if {first, second} <= has:
+                log.problem(f"{joint} has both {first} and {second}; leave one out")
+    quantities = {s.quantity for s in sources}
+    slides = any(robot.joint(s.joint).kind is Kind.PRISMATIC for s in sources if s.joint)
+    for scalar, names in (("depth", TIP), ("force", FORCE)):
+        missing = [name for name in names if name not in quantities]
+        if missing and len(missing) < len(names):
+            log.problem(f"{', '.join(names)} belong together; give {' and '.join(missing)}, too")
+        if log.values.get("role") == "tissue" and not slides and not quantities & {scalar, *names}:
+            either = f"{scalar}, or {', '.join(names)}, or the position of a prismatic joint"
+            log.problem(f"a tissue log needs a {scalar}; give {either}")
 
-    def complete(self, sources: tuple[Source, ...], robot: Robot) -> None:
-        """Check that joints have a position and an effort, a vector all components, and tissue a depth and a force."""
-        for joint in dict.fromkeys(s.joint for s in sources if s.joint):
-            has = {s.symbol for s in sources if s.joint == joint}
-            for (first, second), needed in ALTERNATIVES:
-                if needed and not has & {first, second}:
-                    self.log.problem(f"{joint} has no {needed}; give {joint}.{first} or {joint}.{second}")
-                if {first, second} <= has:
-                    self.log.problem(f"{joint} has both {first} and {second}; leave one out")
-        quantities = {s.quantity for s in sources}
-        for names in (TIP, FORCE):
-            missing = [name for name in names if name not in quantities]
-            if missing and len(missing) < len(names):
-                self.log.problem(f"{', '.join(names)} belong together; give {' and '.join(missing)}, too")
-        slides = any(robot.joint(s.joint).kind is Kind.PRISMATIC for s in sources if s.joint)
-        for scalar, names in (("depth", TIP), ("force", FORCE)):
-            if self.log.values.get("role") == "tissue" and not slides and not quantities & {scalar, *names}:
-                either = f"{scalar}, or {', '.join(names)}, or the position of a prismatic joint"
-                self.log.problem(f"a tissue log needs a {scalar}; give {either}")
 
-    def source(self, quantity: str, keys: tuple[str, ...], value: Any) -> Source | None:
-        """Read the channel of one quantity: a name, a number, or a table with more properties."""
-        needed = self.unit_kind(quantity, keys)
-        if needed is None:
-            return None
-        values = value if isinstance(value, dict) else {"channel": value}
-        table = TomlTable(values, self.log.file, (*self.log.path, *keys), f"{self.log.place}: channel of {quantity!r}")
-        words = "a name, or a column number from 0"
-        channel = table.take("channel", None, (str, int), words, lambda value: isinstance(value, str) or value >= 0)
-        unit = _unit(table, needed) if "unit" in table else None
-        sign = table.take("sign", 1, (int,), "1 or -1", lambda value: value in (1, -1))
-        offset, scale = table.number("offset", 0.0), table.number("scale", 1.0)
-        if scale == 0:
-            table.problem("scale must not be 0, which would make every sample 0", "scale")
-        table.close()
-        return Source(quantity, channel, needed, unit, sign, offset, scale)
+def _source(log: TomlTable, robot: Robot | None, quantity: str, keys: tuple[str, ...], value: Any) -> Source | None:
+    """Read the channel of one quantity: a name, a number, or a table with more properties."""
+    needed = _unit_kind(log, robot, quantity, keys)
+    if needed is None:
+        return None
+    values = value if isinstance(value, dict) else {"channel": value}
+    table = TomlTable(values, log.file, (*log.path, *keys), f"{log.place}: channel of {quantity!r}")
+    words = "a name, or a column number from 0"
+    channel = table.take("channel", None, (str, int), words, lambda value: isinstance(value, str) or value >= 0)
+    unit = _unit(table, needed) if "unit" in table else None
+    sign = table.take("sign", 1, (int,), "1 or -1", lambda value: value in (1, -1))
+    offset, scale = table.number("offset", 0.0), table.number("scale", 1.0)
+    if scale == 0:
+        table.problem("scale must not be 0, which would make every sample 0", "scale")
+    table.close()
+    return Source(quantity, channel, needed, unit, sign, offset, scale)
 
-    def unit_kind(self, quantity: str, keys: tuple[str, ...]) -> str | None:
-        """What the unit of a quantity measures, or None for an unknown quantity."""
-        joint, _, symbol = quantity.rpartition(".")
-        if not joint and quantity in OF_THE_LOG:
-            return OF_THE_LOG[quantity]
-        if symbol not in OF_A_JOINT or not joint:
-            quantities = ", ".join([*OF_THE_LOG, *(f"<joint>.{s}" for s in OF_A_JOINT)])
-            self.log.problem(f"unknown quantity {quantity!r}; the quantities are {quantities}", *keys)
-            return None
-        if self.robot is None:
-            return None
+
+def _unit_kind(log: TomlTable, robot: Robot | None, quantity: str, keys: tuple[str, ...]) -> str | None:
+    """What the unit of a quantity measures, or None for an unknown quantity."""
+    joint, _, symbol = quantity.rpartition(".")
+    if quantity in OF_THE_LOG:
+        return OF_THE_LOG[quantity]
+    quantities = ", ".join([*OF_THE_LOG, *(f"<joint>.{s}" for s in OF_A_JOINT)])
+    problem = f"unknown quantity {quantity!r}; the quantities are {quantities}"
+    if joint and symbol in OF_A_JOINT:
         try:
-            return kind_of_unit(self.robot.joint(joint), symbol)
+            return kind_of_unit(robot.joint(joint), symbol) if robot else None
         except BadRobot as error:
-            self.log.problem(str(error), *keys)
-            return None
+            problem = str(error)
+    log.problem(problem, *keys)
+    return None
 
 
 def kind_of_unit(joint: Joint, symbol: str) -> str:

@@ -11,7 +11,7 @@ from davinci_forces.logs.log import Options
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.study import WHOLE_LOG, AttachedMass, LogEntry
-from davinci_forces.study.channels import Channels
+from davinci_forces.study.channels import sources_of
 from davinci_forces.toml import TomlTable, excerpt
 from davinci_forces.toml.lines import MAX_TABLES
 
@@ -73,7 +73,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         study.problem(f"log name {wrong}", "log", index, "name")
     table.place = f"log {name!r}"
     entry = LogEntry(
-        name, _files(table), table.text("role", choices=ROLES), Channels(table, robot).read(), "join" in table,
+        name, _files(table), table.text("role", choices=ROLES), sources_of(table, robot), "join" in table,
         period=optional_number(table, "period"), rate=optional_number(table, "rate"),
         skip=optional_number(table, "skip") or 0.0, until=_end(table),
         contact=_windows(table, "contact"), free=_windows(table, "free"), weight=_weight(table, robot),
