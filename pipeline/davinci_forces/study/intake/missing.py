@@ -32,7 +32,7 @@ def without_empty_rows(timed: Iterator[TimedBlock], names: Sequence[str]) -> Ite
 
 @dataclass
 class Missing:
-    """The missing samples of one channel, and of those the ones after the last row without any."""
+    """The missing samples of one channel, or the rows left out, and of those the ones after the last whole row."""
 
     rows: int = 0
     count: int = 0
@@ -47,8 +47,7 @@ class MissingSamples:
     until: float = np.inf  # [s] from the first sample
     channels: dict[str, Missing] = field(default_factory=dict)
     filled_rows: int = 0
-    left_out: int = 0  # rows with longer runs
-    at_end: int = 0  # of those, the rows after the last that is not left out
+    left_out: Missing = field(default_factory=Missing)  # rows with longer runs
 
     def without_missing(self, timed: Iterator[TimedBlock], names: Sequence[str]) -> Iterator[TimedBlock]:
         """Yield the rows in which no sample of these channels is missing; `FILLED_IN` is 1 where one was filled in."""
@@ -82,16 +81,14 @@ class MissingSamples:
     def _count(self, missing: dict[str, Booleans], whole: Booleans, counted: Booleans) -> None:
         """Count the missing samples of rows that are used or left out, and the rows."""
         after = int(np.flatnonzero(whole)[-1]) + 1 if whole.any() else 0
-        for name, mask in missing.items():
-            state, mask = self.channels[name], mask & counted
+        states = [*(self.channels[name] for name in missing), self.left_out]
+        for state, lacks in zip(states, (*missing.values(), ~whole), strict=True):
+            mask = lacks & counted
             if mask.any() and state.first < 0:
                 state.first = state.rows + int(np.argmax(mask))
             state.rows += int(counted.sum())
             state.count += int(mask.sum())
             state.at_end = int(mask[after:].sum()) + (0 if whole.any() else state.at_end)
-        incomplete = ~whole & counted
-        self.left_out += int(incomplete.sum())
-        self.at_end = int(incomplete[after:].sum()) + (0 if whole.any() else self.at_end)
         self.filled_rows += int((whole & counted & np.any([*missing.values()], axis=0)).sum())
 
     def require_most(self, log: Log) -> None:

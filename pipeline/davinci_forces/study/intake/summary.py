@@ -35,7 +35,7 @@ def summary(intake: Intake) -> LogSummary:
         clock, log=entry.name, role=entry.role, format=log.format, files=entry.files,
         started="" if log.started.startswith(UNSET_START) else log.started, zone=log.zone,
         rows=clock.samples, rate=rate, duration=duration, jitter=jitter, longest_gap=longest_gap,
-        dropped=log.dropped + missing.left_out,
+        dropped=log.dropped + missing.left_out.count,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
         channel=np.array([*map(visible, names)], object),
@@ -68,12 +68,13 @@ def remarks(intake: Intake) -> Iterator[str]:
             f"{clock.last - clock.first:g} s; both count from its first sample"
         )
     missing = intake.clocks.missing
-    if end := missing.at_end if intake.log.cut else 0:
+    left_out = missing.left_out.count
+    if end := missing.left_out.at_end if intake.log.cut else 0:
         yield f"the file is truncated: its last {end} rows lack some channels and are left out"
-    if missing.filled_rows or missing.left_out > end:
+    if missing.filled_rows or left_out > end:
         lacking = ", ".join(f"{name!r} {c.count}" for name, c in missing.channels.items() if c.count > c.at_end)
         yield (
             f"samples are missing ({lacking}): {missing.filled_rows} rows with up to {1e3 * FILLED:g} ms or one sample "
-            f"missing are filled by cubics, and neither fitted nor judged; {missing.left_out - end} rows are gaps"
+            f"missing are filled by cubics, and neither fitted nor judged; {left_out - end} rows are gaps"
         )
     yield from clocks.remarks(clock, clock.rate)
