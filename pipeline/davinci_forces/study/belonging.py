@@ -100,7 +100,7 @@ def arm_of(
         described = [arm for arm in arms if arm.reason]
         return described[0] if len(described) == 1 else next(arm for arm in arms if arm.name == DEFAULT_ROBOT)
     words = {word for name in names for word in words_of(name)}
-    current = any("i" in holding.symbols() for holding in counted)
+    current = any(holding.joints_with(("i",)) for holding in counted)
     of_the_kit = words & {"psm", "dvrk"} or ("yaw" in words and not current)
     for arm in arms:
         if any(holding.robot == arm.robot for holding in counted):

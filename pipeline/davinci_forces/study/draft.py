@@ -118,7 +118,8 @@ def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
     log = open_log(files[0])
     holding = guess(log, listed)
     touching = tissue_channels([channel for channel in log.channels if not is_time(channel)])
-    if holding.meanings and holding.is_to_check and is_tissue([*touching.values()]):  # names tell more than values
+    by_values = all(meaning.reason.startswith("CHECK") for meaning in holding.meanings.values())
+    if holding.meanings and by_values and is_tissue([*touching.values()]):  # names tell more than values
         holding = Holding(timing=holding.timing)
     touching = {name: quantity for name, quantity in touching.items() if name not in holding.meanings}
     if holding.meanings:
@@ -187,13 +188,13 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
 
 def _joints_by_current(robot: Robot, drawn: Sequence[DraftLog]) -> list[Joint]:
     """The joints whose effort is known by the current of their motor."""
-    by_current = {m.joint for draft in drawn for m in draft.guess.meanings.values() if m.symbol == "i"}
+    by_current = {k for draft in drawn for k in draft.guess.joints_with(("i",))}
     return [joint for k, joint in enumerate(robot.joints) if k in by_current]
 
 
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
     """Take efforts as currents in all logs without names that have as many channels as one that holds currents."""
-    widths = {len(d.log.channels) for d in drawn if "i" in d.guess.symbols()}
+    widths = {len(d.log.channels) for d in drawn if d.guess.joints_with(("i",))}
     reason = "CHECK: current, as in another log of as many channels"
     for i, draft in enumerate(drawn):
         meanings = draft.guess.meanings if len(draft.log.channels) in widths else {}

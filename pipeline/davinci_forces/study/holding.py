@@ -39,10 +39,6 @@ class Holding:
     units: dict[str, str] = field(default_factory=dict)  # that the log states, by name
     courses: dict[int, Course] = field(default_factory=dict, compare=False)  # of the moving joints
 
-    def symbols(self) -> set[str]:
-        """The symbols of the joints."""
-        return {meaning.symbol for meaning in self.meanings.values()}
-
     def joints_with(self, symbols: Sequence[str] = SYMBOLS) -> set[int]:
         """The joints that have a channel of one of these symbols."""
         return {meaning.joint for meaning in self.meanings.values() if meaning.symbol in symbols}
@@ -66,11 +62,6 @@ class Holding:
         """The same with other reasons."""
         meanings = {name: replace(m, reason=reason_of(m.reason)) for name, m in self.meanings.items()}
         return replace(self, meanings=meanings)
-
-    @property
-    def is_to_check(self) -> bool:
-        """Whether what each channel holds is a guess by its values."""
-        return all(meaning.reason.startswith("CHECK") for meaning in self.meanings.values())
 
     @property
     def has_named_joints(self) -> bool:

@@ -68,11 +68,6 @@ class LogTable:
     role: Role
     tare: str
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing in it can be used, so that it is written commented out."""
-        return not self.draft.guess.meanings and not self.draft.touching
-
     def lines(self) -> list[str]:
         """The lines of the [[log]]; all of them comments if nothing in the log can be used."""
         paths = [in_toml(path) for path in paths_in(self.draft.files, self.folder)]
@@ -93,13 +88,15 @@ class LogTable:
             "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i",
             "# of the log: time; of tissue also push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z",
         ]
-        if not self.is_empty:
+        if not self.why_empty:
             return ["", *block]
         return ["", f"# {self.name}: left out: {self.why_empty}", *(f"# {line.removeprefix('# ')}" for line in block)]
 
     @property
     def why_empty(self) -> str:
-        """Why nothing in the log can be used."""
+        """Why nothing in the log can be used, so that it is written commented out; else ""."""
+        if self.draft.guess.meanings or self.draft.touching:
+            return ""
         names = [channel.name for channel in self.draft.log.channels if not channel.derived]
         some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
         return f"no position and effort of a joint, and no depth and force, among {some}"
@@ -109,8 +106,8 @@ class LogTable:
         timing, holding = self.draft.guess.timing, self.draft.guess
         rate = f"{1 / timing.step:.5g} Hz" if timing.step else "missing" if timing.missing else "-"
         joints = [self.robot.joints[k].name for k in holding.moving if k < len(self.robot.joints)]
-        look = [self.why_empty] if self.is_empty else [*self._doubts(), self.role.reason]
-        role = "left out" if self.is_empty else self.role.role or "missing"
+        look = [self.why_empty] if self.why_empty else [*self._doubts(), self.role.reason]
+        role = "left out" if self.why_empty else self.role.role or "missing"
         file = ", ".join(paths_in(self.draft.files[:1], self.folder)) + (" ..." if len(self.draft.files) > 1 else "")
         return Row(file, role, rate, ", ".join(joints) or "-", "; ".join(filter(None, look)))
 

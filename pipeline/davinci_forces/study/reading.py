@@ -180,15 +180,13 @@ def settings_of(table: TomlTable, robot: Robot | None) -> Settings:
 
 def _wanted_effort(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
     """The external effort to be detected on each joint."""
-    names = [joint.name for joint in robot.joints] if robot else list(efforts.values)
+    names, wanted = [joint.name for joint in robot.joints] if robot else [], {}
     for name in efforts.values:
-        if name not in names:
-            efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(names)}", name)
-    return {
-        name: check_positive(efforts, name, efforts.number(name, kind="effort"))
-        for name in efforts.values
-        if name in names
-    }
+        if robot and name not in names:
+            efforts.problem(f"{robot.name} has no joint {name!r}; it has {', '.join(names)}", name)
+        else:
+            wanted[name] = check_positive(efforts, name, efforts.number(name, kind="effort"))
+    return wanted
 
 
 def _setting(table: TomlTable, field: Field[Any]) -> Any:

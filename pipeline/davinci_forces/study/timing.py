@@ -101,9 +101,7 @@ def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Arra
     if unnamed and not times:
         first = columns.first_rising_column([samples[channel.name] for channel in numbers])
         times = [numbers[first]] if first is not None else []
-    timings = [_timing_by(channel, samples[channel.name], pairs, unnamed) for channel in times]
-    known = [timing for timing in timings if timing is not None]
-    if known:
+    if known := [guess for one in times if (guess := _timing_by(one, samples[one.name], pairs, unnamed))]:
         return next((timing for timing in known if timing.time), known[0])
     if per_sample is not None:
         rate = columns.round_rate(per_sample.ratio)
