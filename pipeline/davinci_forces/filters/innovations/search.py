@@ -6,25 +6,26 @@ factor `MIN_GROWTH`.  A test may also pass because samples are omitted; so if as
 instead, the tests must still fail.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
 
-from davinci_forces.filters.innovations.trials import (
-    CLOCK,
-    COLOUR,
-    CONTACT,
-    FINER_STEPS,
-    LEVEL,
-    REVERSALS,
-    SIZES,
-    STEP,
-    WALK,
-    Passes,
-    Subject,
-    Trial,
-)
+import numpy as np
 
+from davinci_forces.filters import DEFAULT, tracker
+from davinci_forces.filters.innovations import coloured
+from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.filters.tuning import likeliest_walk
+from davinci_forces.maths.arrays import Array, Booleans, runs
+from davinci_forces.maths.signals.whiteness import tests
+from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient
+
+LEVEL = 0.01  # probability below which a test rejects white noise
+LAGS = 20  # number of lags of the Ljung-Box statistic
+ELSEWHERE = 8  # number of other times at which as many samples are tested
+CONTACT, REVERSALS = "contact", "reversals"  # their samples are omitted
+WALK, SIZES, CLOCK, COLOUR = "walk", "sizes", "clock", "colour"  # corrected, as other models are
 MIN_GROWTH = 100.0  # least factor by which the removal of a cause increases the smallest probability
 MAX_SAMPLES_SEARCH = 50_000  # the first samples of a run
 MIN_SAMPLES_TRIAL = 200  # tests on fewer samples are ignored
@@ -36,11 +37,116 @@ CAUSES = {
     SIZES: "noise of another size than assumed",
     COLOUR: "coloured measurement noise",
     CLOCK: "uneven sampling times, as the other joints show",
-    STEP: "the error of the filter's integration step",
 }
 NO_CAUSE = "not white: no tested cause explains it"
 BY_CHANCE = "not white, but only slightly, as happens by chance in one of many runs"
 MIN_SHARE_NAMED = 0.5  # a cause is named if it explains at least this share of the correlation
+
+
+class Trial(NamedTuple):
+    """The tests of the innovations with some causes removed."""
+
+    without: tuple[str, ...]
+    tested: int
+    ljung_box: tuple[float, float]  # probabilities, of q and dq
+    periodogram: tuple[float, float]
+    excess: float  # the sum of squared autocorrelations beyond that of white noise, of q and dq together
+    walk: float  # fitted `q_tau` over the `q_tau` in use
+
+    @property
+    def lowest(self) -> float:
+        """Return the smallest probability."""
+        return min(*self.ljung_box, *self.periodogram)
+
+    @property
+    def white(self) -> bool:
+        """Whether every test passes."""
+        return self.lowest > LEVEL
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A joint's run without a gap, and the passes of the default filter over it; fitted noise is kept."""
+
+    models: Mapping[str, FilterInput]  # the run (N,) under each model, that in use first, and `CLOCK` with even times
+    noise: NoiseModel
+    free: Booleans  # (N,) whether nothing touches the robot
+    moving: Booleans  # (N,) whether the joint is far from any reversal
+    _noises: dict[tuple[str, ...], coloured.Noise] = field(default_factory=dict)
+
+    def trial(self, without: tuple[str, ...]) -> Trial:
+        """Test the innovations without these causes."""
+        pieces_q, pieces_dq = self.pieces(without, *self.samples(without))
+        (box_q, wave_q), (box_dq, wave_dq) = tests(pieces_q, LAGS), tests(pieces_dq, LAGS)
+        tested = sum(map(len, pieces_q))
+        excess = max(box_q.statistic + box_dq.statistic - 2.0 * LAGS, 0.0) / max(tested, 1)
+        walk = self.likeliest_noise(without).white.q_tau / self.noise.q_tau if self.noise.q_tau else 1.0
+        probabilities = (box_q.probability, box_dq.probability)
+        return Trial(without, tested, probabilities, (wave_q, wave_dq), excess, walk)
+
+    def fails_elsewhere(self, without: tuple[str, ...]) -> bool:
+        """Whether as many samples at most other times fail, where samples are omitted."""
+        free, moving = self.samples(without)
+        if free.all() and moving.all():
+            return True
+        failed = 0
+        for i in range(1, ELSEWHERE + 1):
+            later = round(len(free) * (i * 0.6180339887498949 % 1.0))  # even offsets, no multiples of a period
+            pieces = self.pieces(without, np.roll(free, later), np.roll(moving, later))
+            failed += any(min(box.probability, wave) <= LEVEL for box, wave in (tests(x, LAGS) for x in pieces))
+        return failed > ELSEWHERE // 2
+
+    def samples(self, without: tuple[str, ...]) -> tuple[Booleans, Booleans]:
+        """Return the samples (N,) that the filter runs over, and those (N,) whose innovations are tested."""
+        return self.free | (CONTACT not in without), self.moving | (REVERSALS not in without)
+
+    def run_under_model(self, without: tuple[str, ...]) -> FilterInput:
+        """Return the run under the model that replaces a removed one, or the model in use."""
+        names = list(self.models)
+        return self.models[next((name for name in names[1:] if name in without), names[0])]
+
+    def pieces(self, without: tuple[str, ...], free: Booleans, moving: Booleans) -> tuple[list[Array], list[Array]]:
+        """Return the settled innovations of position and velocity, run by run."""
+        pieces_q, pieces_dq = [], []
+        for run in self.runs(free):
+            part = self.run_under_model(without).part(run)
+            i_q, i_dq = self.innovations(without, part)
+            for piece in runs(is_past_transient(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
+                if piece.stop - piece.start > LAGS:
+                    pieces_q.append(i_q[piece])
+                    pieces_dq.append(i_dq[piece])
+        return pieces_q, pieces_dq
+
+    def runs(self, free: Booleans) -> list[slice]:
+        """Return the runs that are long enough for the filter to settle, or else the longest run."""
+        T_s = next(iter(self.models.values())).T_s
+        long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * TRANSIENT]
+        return long or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
+
+    def innovations(self, without: tuple[str, ...], part: FilterInput) -> tuple[Array, Array]:
+        """Compute the innovations of one run."""
+        noise = self.likeliest_noise(without)
+        if COLOUR in without:
+            return coloured.innovations(part, noise)
+        tracked = tracker(DEFAULT)(part, noise.white)
+        return tracked.innovation_q, tracked.innovation_dq
+
+    def likeliest_noise(self, without: tuple[str, ...]) -> coloured.Noise:
+        """Return the noise in use, or that of greatest likelihood if noise is a removed cause."""
+        key = tuple(name for name in without if name != REVERSALS)
+        if key not in self._noises:
+            self._noises[key] = self._fit_noise(key)
+        return self._noises[key]
+
+    def _fit_noise(self, without: tuple[str, ...]) -> coloured.Noise:
+        noise, recording = self.noise, self.run_under_model(without)
+        parts = [recording.part(run) for run in self.runs(self.samples(without)[0])]
+        if WALK in without:
+            noise = noise._replace(q_tau=likeliest_walk(parts, noise))
+        if not {SIZES, CLOCK, COLOUR} & {*without}:
+            return coloured.Noise(noise, coloured.UNCOLOURED)
+        longest = max(parts, key=lambda part: len(part.q))
+        return coloured.fit_noise(longest, noise, WALK in without, COLOUR in without)
 
 
 class CauseSearch(NamedTuple):
@@ -60,11 +166,26 @@ class CauseSearch(NamedTuple):
         largest = max(map(self.share, trials))
         return next(trial for trial in trials if self.share(trial) >= NEARLY_BEST * largest)
 
+    @property
+    def outcome(self) -> str:
+        """Whether it is white, white where samples are left out, explained by a cause, or unexplained."""
+        if self.trials[0].white:
+            return WHITE
+        if not self.explaining:
+            return UNEXPLAINED
+        return LEFT_OUT if any({*trial.without} <= {*OMITTED} for trial in self.explaining) else MENDED
+
+    @property
+    def verdict(self) -> str:
+        """The result in words, with all explanations."""
+        if self.trials[0].white:
+            return WHITE
+        return "; or ".join(map(describe_trial, self.explaining)) or describe_unexplained(self)
+
 
 def search(subject: Subject) -> CauseSearch:
     """Find the fewest causes without which the innovations are white."""
-    passes = Passes(subject)
-    trials = [passes.trial(())]
+    trials = [subject.trial(())]
     possible_causes = list(causes(subject))
     for size in range(1, MAX_CAUSES + 1):
         if trials[0].white or trials[0].tested < MIN_SAMPLES_TRIAL:
@@ -73,10 +194,10 @@ def search(subject: Subject) -> CauseSearch:
         for without in combinations(possible_causes, size):
             if not may_combine(without, subject, explaining):
                 continue
-            trial = passes.trial(without)
+            trial = subject.trial(without)
             trials.append(trial)
             enough = trial.tested >= MIN_SAMPLES_TRIAL and trial.lowest > MIN_GROWTH * trials[0].lowest
-            if trial.white and enough and passes.fails_elsewhere(without):
+            if trial.white and enough and subject.fails_elsewhere(without):
                 explaining.append(trial)
         if explaining:
             return CauseSearch(trials, explaining)
@@ -89,8 +210,6 @@ def causes(subject: Subject) -> Iterator[str]:
         yield CONTACT
     if not subject.moving.all():
         yield REVERSALS
-    if subject.filter in FINER_STEPS:
-        yield STEP
     yield from (WALK, SIZES)
     yield from list(subject.models)[1:]
     yield COLOUR
@@ -111,22 +230,6 @@ def may_combine(without: tuple[str, ...], subject: Subject, explaining: list[Tri
         return True
     simpler = {*without} - {CLOCK, COLOUR} | {SIZES}
     return others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining)
-
-
-def classify(search: CauseSearch) -> str:
-    """Classify the result: white, white where samples are left out, explained by a cause, or unexplained."""
-    if search.trials[0].white:
-        return WHITE
-    if not search.explaining:
-        return UNEXPLAINED
-    return LEFT_OUT if any({*trial.without} <= {*OMITTED} for trial in search.explaining) else MENDED
-
-
-def verdict(search: CauseSearch) -> str:
-    """Return the result in words, with all explanations."""
-    if search.trials[0].white:
-        return "white"
-    return "; or ".join(map(describe_trial, search.explaining)) or describe_unexplained(search)
 
 
 def describe_trial(trial: Trial) -> str:

@@ -5,8 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters.innovations.innovations import Innovations, correct_times, delays, innovations
-from davinci_forces.filters.innovations.search import MAX_SAMPLES_SEARCH, CauseSearch, classify, search, verdict
-from davinci_forces.filters.innovations.trials import CLOCK, Subject
+from davinci_forces.filters.innovations.search import CLOCK, MAX_SAMPLES_SEARCH, CauseSearch, Subject, search
 from davinci_forces.filters.problem import FilterInput, Recording, filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import Identified, LogModels, refit_effort
@@ -194,8 +193,8 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
     return Explanation.like(
         model,
-        finding=classify(causes),
-        verdict=verdict(causes) + caveat,
+        finding=causes.outcome,
+        verdict=causes.verdict + caveat,
         clock_std=clock_std,
         without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),
         explains=np.array([t in causes.explaining for t in trials], np.int64),
