@@ -244,8 +244,8 @@ def selection_of(**scores: tuple[int, float, bool]) -> Selection:
     made = [Named(name, rank) for name, (rank, _, _) in scores.items()]
     results, physical = [worth(x) for _, x, _ in scores.values()], [x for _, _, x in scores.values()]
     chosen, best = choose_candidate(results, [c.rank for c in made], physical if any(physical) else [True] * len(made))
-    table = {"score": np.array([x for _, x, _ in scores.values()])}
-    return Selection(tuple(made), tuple(results), tuple(physical), table, made[chosen], made[best], "")
+    repeated = ((np.nan, np.nan),) * len(made)
+    return Selection(tuple(made), tuple(results), tuple(physical), repeated, made[chosen], made[best], "")
 
 
 def test_where_physics_forbids_the_searched_model_that_is_chosen_the_others_that_it_forbids_compete():
@@ -253,7 +253,7 @@ def test_where_physics_forbids_the_searched_model_that_is_chosen_the_others_that
     both = better(selection_of(alone=(3, 0.2, True), smooth=(7, 0.08, False)), searched)
     assert (both.chosen.name, both.best.name, both.chosen.variant) == ("smooth", "smooth", CHOSEN)
     assert "less than any other" in both.why
-    assert both.scores["score"].tolist() == [0.2, 0.08, 0.09]
+    assert [result.score for result in both.results] == [0.2, 0.08, 0.09]
     both = better(selection_of(alone=(3, 0.2, True), smooth=(7, 0.1, False)), searched)
     assert both.chosen.name == "searched"
 

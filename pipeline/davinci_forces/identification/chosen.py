@@ -16,7 +16,6 @@ from davinci_forces.maths.selection import MAX_GROUPS, CrossValidation, Equation
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
 from davinci_forces.records.prediction import CHOSEN
 
-JOINED = ("candidates", "physical", "results")  # fields of two selections
 LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
 NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
 MIN_INERTIA_SHARE = 1e-3  # of a joint's effort over its paths
@@ -29,14 +28,27 @@ class Selection:
     candidates: tuple[Candidate, ...]
     results: tuple[CrossValidation, ...]
     physical: tuple[bool, ...]
-    scores: dict[str, Array]  # `score`, `training`, and `over_periods` with periods left out, NaN if no path repeats
+    repeated: tuple[tuple[float, float], ...]  # score with periods left out, and its error; NaN if no path repeats
     chosen: Candidate
     best: Candidate
     why: str
 
+    @property
+    def scores(self) -> dict[str, Array]:
+        """The scores of all candidates with their errors: on data left out, in training, and over periods."""
+        fits, (over_periods, over_periods_std) = [result.fit for result in self.results], np.array(self.repeated).T
+        return {
+            "score": np.array([result.score for result in self.results]),
+            "score_std": np.array([standard_error(result) for result in self.results]),
+            "training": np.array([fit.score for fit in fits]),
+            "training_std": np.array([standard_error(fit) for fit in fits]),
+            "over_periods": over_periods,
+            "over_periods_std": over_periods_std,
+        }
+
     def score_of(self, candidate: Candidate) -> float:
         """Return the error of one of the candidates."""
-        return float(self.scores["score"][[c.name for c in self.candidates].index(candidate.name)])
+        return self.results[[c.name for c in self.candidates].index(candidate.name)].score
 
 
 class BlockEstimate(NamedTuple):
@@ -63,27 +75,11 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes))] if schemes else []
     if not pairs:
         return None
-    models, results = (list(column) for column in zip(*pairs, strict=True))
-    physical = [c.is_physical for c in models]
-    eligible = physical if any(physical) else [True] * len(models)
-    chosen, best = choose(models, results, eligible)
-    repeated = np.array([over_periods(c, count) for c in models])
-    return Selection(
-        candidates=tuple(models),
-        results=tuple(results),
-        physical=tuple(physical),
-        scores={
-            "score": np.array([result.score for result in results]),
-            "score_std": np.array([standard_error(result) for result in results]),
-            "training": np.array([result.fit.score for result in results]),
-            "training_std": np.array([standard_error(result.fit) for result in results]),
-            "over_periods": repeated[:, 0],
-            "over_periods_std": repeated[:, 1],
-        },
-        chosen=models[chosen],
-        best=models[best],
-        why=reason(models, results, chosen, best),
-    )
+    models, results = zip(*pairs, strict=True)
+    physical = tuple(c.is_physical for c in models)
+    i, best = choose(models, results, physical if any(physical) else [True] * len(models))
+    repeated = tuple(over_periods(c, count) for c in models)
+    return Selection(models, results, physical, repeated, models[i], models[best], reason(models, results, i, best))
 
 
 def better(fixed: Selection, searched: Selection | None) -> Selection:
@@ -92,23 +88,18 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
     If physics forbids that one, and it is chosen nevertheless, the others that physics forbids compete with it.
     """
     both = [fixed, *([searched] if searched else [])]
-    candidates, physical, results = ([x for of in both for x in getattr(of, name)] for name in JOINED)
+    candidates, results, physical, repeated = (
+        tuple(x for of in both for x in getattr(of, name)) for name in ("candidates", "results", "physical", "repeated")
+    )
     place = {c.name: i for i, c in enumerate(candidates)}
     i = min((place[of.chosen.name] for of in both), key=lambda k: results[k].score)
-    eligible = physical if physical[i] else [True] * len(candidates)
+    eligible = physical if physical[i] else (True,) * len(candidates)
     if not physical[i]:
         free = [of.candidates[choose(of.candidates, of.results, [True] * len(of.results))[0]] for of in both]
         i = min((place[c.name] for c in free), key=lambda k: results[k].score)
     best = min(np.flatnonzero(eligible).tolist(), key=lambda k: results[k].score)
-    return Selection(
-        candidates=tuple(candidates),
-        results=tuple(results),
-        physical=tuple(physical),
-        scores={name: np.concatenate([of.scores[name] for of in both]) for name in fixed.scores},
-        chosen=candidates[i]._replace(variant=CHOSEN),
-        best=candidates[best],
-        why=reason(candidates, results, i, best),
-    )
+    chosen, why = candidates[i]._replace(variant=CHOSEN), reason(candidates, results, i, best)
+    return Selection(candidates, results, physical, repeated, chosen, candidates[best], why)
 
 
 def choose(
