@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from davinci_forces.filters.sample import correct, first, predict, sign, transition
+from davinci_forces.filters.sample import bias, correct, first, predict, sign, transition
 
 Array = NDArray[Any]  # of floats
 OK, STARTING, OUTSIDE_VALIDITY, BAD_INPUT = "ok", "starting", "outside validity", "bad input"
@@ -91,25 +91,21 @@ class LinkTree:
         self.slides = [bool(link["prismatic"]) or k < 0 for link, k in zip(links, self.coordinate, strict=True)]
         self.placement = [np.array(link["placement"], float)[:3] for link in links]
         self.gravity = gravity * np.array(chain["up"], float)
-        self.tip: tuple[int, Array] | None = None
-        if tip := chain.get("tip"):
-            self.tip = 0 if tip["link"] is None else tip["link"] + 1, np.array(tip["position"])
+        self.tip_body: Array | None = None  # 1 kg at the tip
+        if (tip := chain.get("tip")) and tip["link"] is not None:
+            self.tip_body = np.zeros((len(links), len(INERTIAL)))
+            self.tip_body[tip["link"], :4] = 1.0, *tip["position"]
 
-    def poses(self, q: Array) -> tuple[list[Array], list[Array]]:
-        """Rotations (B, 3, 3) and positions (B, 3) of the links in the frames of their parents, at q (B, n)."""
-        R, r = list[Array](), list[Array]()
+    def efforts(self, bodies: Array, q: Array, dq: Array, ddq: Array, up: Array) -> Array:
+        """Efforts (B, n) of motions (B, n) of links with bodies (L, 10); `up` (B, 3) opposes gravity."""
+        R, r = list[Array](), list[Array]()  # of the links in the frames of their parents
         for k, slides, T in zip(self.coordinate, self.slides, self.placement, strict=True):
             x: Array = q[:, k, None] if k >= 0 else np.zeros((len(q), 1))
             c, s = (np.ones_like(x), np.zeros_like(x)) if slides else (np.cos(x), np.sin(x))
             R.append(np.stack([c * T[:, 0] + s * T[:, 1], c * T[:, 1] - s * T[:, 0], T[:, 2] + 0.0 * x], axis=-1))
             r.append(T[:, 3] + (x * T[:, 2] if slides else 0.0 * x))
-        return R, r
-
-    def efforts(self, bodies: Array, q: Array, dq: Array, ddq: Array, weight: Array) -> Array:
-        """Efforts (B, n) of motions (B, n) of links with bodies (L, 10); `weight` (B,) scales gravity."""
-        R, r = self.poses(q)
         w, e = [np.zeros((len(q), 3))], [np.zeros((len(q), 3))]
-        a, f, n = [weight[:, None] * self.gravity], [np.zeros((len(q), 3))], [np.zeros((len(q), 3))]
+        a, f, n = [up], [np.zeros((len(q), 3))], [np.zeros((len(q), 3))]
         z = np.array([0.0, 0.0, 1.0])
         for i, (parent, k, slides) in enumerate(zip(self.parent, self.coordinate, self.slides, strict=True)):
             v, u = (dq[:, k, None], ddq[:, k, None]) if k >= 0 else (np.zeros((len(q), 1)),) * 2
@@ -136,21 +132,10 @@ class LinkTree:
         return tau
 
     def tip_jacobian(self, q: Array) -> Array:
-        """The Jacobian (3, n) of the tip's position at q (n,), in base axes."""
-        assert self.tip is not None
-        R, r = self.poses(q[None])
-        turns, places = [np.eye(3)], [np.zeros(3)]
-        for i, parent in enumerate(self.parent):
-            turns.append(turns[parent] @ R[i][0])
-            places.append(turns[parent] @ r[i][0] + places[parent])
-        body, J = self.tip[0], np.zeros((3, len(q)))
-        point = turns[body] @ self.tip[1] + places[body]
-        while body:
-            k, z = self.coordinate[body - 1], turns[body][:, 2]
-            if k >= 0:
-                J[:, k] += z if self.slides[body - 1] else _cross(z, point - places[body])
-            body = self.parent[body - 1]
-        return J
+        """The Jacobian (3, n) of the tip's position at q (n,): the efforts of 1 N there along each axis of the base."""
+        assert self.tip_body is not None
+        still = np.zeros((3, len(q)))
+        return self.efforts(self.tip_body, q + still, still, still, np.eye(3))
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -277,12 +262,7 @@ class OnlineJoint:
         q, dq, ddq = motion
         M += sum(t.value * t.acceleration for t in self.terms)
         tau_hat = self.effort(q, dq, ddq, of_links)
-        if self.coupled:
-            known = tau_hat - M * ddq - self.c[4] * dq - self.c[5] * sign(dq)
-        else:
-            known = sum(
-                t.value * t.c[6] * _state(t, z, q, dq) for t, z in zip(self.terms, self.z, strict=True) if t.kind
-            )
+        known = tau_hat - M * ddq - bias(self.c, q, dq, 0.0)[0]
         if self.belief is None:
             self.belief = first(y[0], y[1], math.sqrt(self.R[0]), math.sqrt(self.R[1]), self.initial_std)
         now, *_ = correct(self.belief, y[0], y[1], self.R[0], self.R[1])
@@ -347,7 +327,7 @@ class Stream:
         self.links = LinkTree(chain, model["gravity"])
         self.filters = [OnlineJoint(j, models[j["model"]], self.coordinates, self.links) for j in joints]
         self.rate, self.offset = float(rates[0]), np.zeros(len(names))
-        self.has_tip = names == every and len(every) == 3 and self.links.tip is not None
+        self.has_tip = names == every and len(every) == 3 and self.links.tip_body is not None
         self.has_tip = self.has_tip and all(j["units"]["effort"] in ("N m", "N") for j in joints)
         processing = [(self.rate, j["motion"]["cutoff"], j["motion"]["effort_lag"]) for j in joints]
         self.delay = max(delay_of(processing), 0.0)
@@ -446,7 +426,8 @@ class Stream:
             return 0.0, 0.0
         unit, still = np.eye(len(q))[joint.row], np.zeros_like(q)
         q, dq, ddq = (np.stack(pair) for pair in ((q, q), (dq, still), (ddq, unit)))
-        tau, M = self.links.efforts(joint.bodies, q, dq, ddq, np.array([1.0, 0.0]))[:, joint.row]
+        up = np.stack([self.links.gravity, np.zeros(3)])
+        tau, M = self.links.efforts(joint.bodies, q, dq, ddq, up)[:, joint.row]
         return float(tau), float(M)
 
     def _force(self, q: Array, tau_ext: Array) -> Array:
