@@ -59,14 +59,7 @@ def identify(
         if len(x) != len(times):
             raise BadRequest(f"t has {len(times)} logs, but {name} has {len(x)}; give a list of as many for each")
     moved = joints_of(arm, given["q"][0], [joints] if isinstance(joints, str) else joints)
-    problems: list[str] = []
-    columns = [
-        columns_of(log, {name: x[i] for name, x in given.items()}, moved, f"log {i + 1}: " if several else "", problems)
-        for i, log in enumerate(times)
-    ]
-    if problems:
-        raise BadRequest("\n".join(problems))
-    return IdentifiedArm(arm, used, moved, columns, periods, (robot, dict(settings or {})))
+    return IdentifiedArm(arm, used, moved, columns_of(times, given, moved), periods, (robot, dict(settings or {})))
 
 
 def refuse(table: TomlTable) -> None:
@@ -91,29 +84,35 @@ def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[st
 
 
 def columns_of(
-    t: Samples, values: Mapping[str, Samples], joints: Sequence[str], place: str, problems: list[str]
-) -> Columns:
-    """The channels of one log; adds to the problems what is wrong with its arrays, each with its name and number."""
-    columns = {"time": np.asarray(t, np.float64)}
-    before = len(problems)
-    if columns["time"].ndim != 1 or len(columns["time"]) < MIN_SAMPLES:
-        problems.append(f"{place}t has shape {columns['time'].shape}; give (n,) times, of at least {MIN_SAMPLES}")
-    for symbol, given in values.items():
-        named = isinstance(given, pd.DataFrame) and set(joints) <= set(given.columns)
-        array = np.asarray(given[list(joints)] if named else given, np.float64)
-        array = array[:, None] if array.ndim == 1 else array
-        if array.shape != (len(columns["time"]), len(joints)):
-            needed = f"t has {len(columns['time'])} samples, and {len(joints)} joints need as many columns"
-            problems.append(f"{place}{symbol} has shape {np.shape(given)}, but {needed}")
-            continue
-        columns |= {f"{joint}.{symbol}": array[:, i] for i, joint in enumerate(joints)}
-    for name, column in columns.items():
-        if len(missing := np.flatnonzero(~np.isfinite(column))):
-            which = f"{len(missing)} values that are not finite, the first at sample {missing[0]}"
-            problems.append(f"{place}{name} has {which}; remove these samples from all arrays")
-    if len(problems) == before and (late := np.flatnonzero(np.diff(columns["time"]) <= 0)).size:
-        problems.append(f"{place}t does not increase at sample {late[0] + 1}; sort the samples by time")
-    return columns
+    times: Sequence[Samples], given: Mapping[str, Sequence[Samples]], joints: Sequence[str]
+) -> list[Columns]:
+    """The channels of each log; raises BadRequest with all that is wrong with its arrays, by their names."""
+    logs: list[Columns] = []
+    problems: list[str] = []
+    for i, t in enumerate(times):
+        place, before = f"log {i + 1}: " if len(times) > 1 else "", len(problems)
+        columns = {"time": np.asarray(t, np.float64)}
+        if columns["time"].ndim != 1 or len(columns["time"]) < MIN_SAMPLES:
+            problems.append(f"{place}t has shape {columns['time'].shape}; give (n,) times, of at least {MIN_SAMPLES}")
+        for symbol, values in given.items():
+            named = isinstance(values[i], pd.DataFrame) and set(joints) <= set(values[i].columns)
+            array = np.asarray(values[i][list(joints)] if named else values[i], np.float64)
+            array = array[:, None] if array.ndim == 1 else array
+            if array.shape != (len(columns["time"]), len(joints)):
+                needed = f"t has {len(columns['time'])} samples, and {len(joints)} joints need as many columns"
+                problems.append(f"{place}{symbol} has shape {np.shape(values[i])}, but {needed}")
+                continue
+            columns |= {f"{joint}.{symbol}": array[:, k] for k, joint in enumerate(joints)}
+        for name, column in columns.items():
+            if len(missing := np.flatnonzero(~np.isfinite(column))):
+                which = f"{len(missing)} values that are not finite, the first at sample {missing[0]}"
+                problems.append(f"{place}{name} has {which}; remove these samples from all arrays")
+        if len(problems) == before and (late := np.flatnonzero(np.diff(columns["time"]) <= 0)).size:
+            problems.append(f"{place}t does not increase at sample {late[0] + 1}; sort the samples by time")
+        logs.append(columns)
+    if problems:
+        raise BadRequest("\n".join(problems))
+    return logs
 
 
 class IdentifiedArm:
@@ -217,11 +216,8 @@ class IdentifiedArm:
         lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
         for log in self._study.logs:
             lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(*log.files)}"]
-            lines += [
-                f"role = {in_toml(log.role)}",
-                *([f"period = {log.period}"] if log.period else []),
-                "[log.channels]",
-            ]
+            lines += [f"role = {in_toml(log.role)}", *([f"period = {log.period}"] if log.period else [])]
+            lines += ["[log.channels]"]
             lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
         files = [self._study.folder / file for log in self._study.logs for file in log.files]
         files += [Path(robot)] if Path(robot).suffix else []
@@ -281,10 +277,7 @@ class IdentifiedArm:
     def _run_on(
         self, t: Samples, values: dict[str, Samples], stage: str, windows: Mapping[str, Any] | None = None
     ) -> Any:
-        problems: list[str] = []
-        columns = columns_of(t, values, self.joints, "", problems)
-        if problems:
-            raise BadRequest("\n".join(problems))
+        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
         return self._run(stage, self._saved(self._study.folder, NEW, columns, None, "contact", **(windows or {})))
 
     def _run(self, stage: str, *more: LogEntry) -> Any:
