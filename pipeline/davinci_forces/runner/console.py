@@ -51,23 +51,18 @@ class Bar:
     def show(self, stage: str, done: int, total: int) -> None:
         """Draw the bar of a stage, and remove it with its last task."""
         if self._progress is None:
-            self._progress = self._new(stage, total)
+            from rich.console import Console as Terminal
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+            columns = (TextColumn("{task.description:14s}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            self._progress = Progress(*columns, console=Terminal(stderr=True), transient=True)
+            self._progress.add_task(stage, total=total)
+            self._progress.start()
+            atexit.register(self._progress.stop)  # restores the cursor if the run is stopped
         self._progress.update(self._progress.task_ids[0], completed=done)
         if done == total:
             self._progress.stop()
             self._progress = None
-
-    @staticmethod
-    def _new(stage: str, total: int) -> "Progress":
-        from rich.console import Console as Terminal
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description:14s}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        progress = Progress(*columns, console=Terminal(stderr=True), transient=True)
-        progress.add_task(stage, total=total)
-        progress.start()
-        atexit.register(progress.stop)  # restores the cursor if the run is stopped
-        return progress
 
 
 def durations(seconds: dict[str, float]) -> str:
@@ -90,6 +85,11 @@ def table(rows: Sequence[Sequence[str]], right_from: int = sys.maxsize) -> Itera
     for row in rows:
         cells = (f"{cell:{'>' if i >= right_from else '<'}{widths[i]}}" for i, cell in enumerate(row))
         yield "  ".join(cells).rstrip()
+
+
+def shorten(names: Sequence[str], most: int = 3) -> str:
+    """The first of many names, and the number of the others."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def show_markdown(text: str) -> None:

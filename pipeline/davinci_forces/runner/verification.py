@@ -19,6 +19,7 @@ from davinci_forces.files import read_bytes
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import ALL, reporting, runs
+from davinci_forces.runner.console import shorten
 from davinci_forces.runner.execution import error_message
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Folders, Ledger, file_name
@@ -158,7 +159,8 @@ def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
         planned = {file_name(task.name) for task in tasks}
         extra = [entry.task for entry in ledger.entries(step) if file_name(entry.task) not in planned]
         if extra:
-            yield f"{stage_of(step)}: the ledger has entries of tasks that this study does not have: {shorten(extra)}"
+            what = "the ledger has entries of tasks that this study does not have"
+            yield f"{stage_of(step)}: {what}: {shorten(extra, MAX_NAMES)}"
         yield from stale(ledger, tasks)
 
 
@@ -174,7 +176,7 @@ def stale(ledger: Ledger, tasks: Sequence[Task]) -> Iterator[str]:
         for reason in reasons:
             by_reason.setdefault(reason, []).append(task.name)
     for reason, names in by_reason.items():
-        yield f"{stage_of(tasks[0].step)}: {shorten(names)}: {reason}"
+        yield f"{stage_of(tasks[0].step)}: {shorten(names, MAX_NAMES)}: {reason}"
 
 
 def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:
@@ -212,11 +214,6 @@ def altered_numbers(file: str, content: bytes, expected_content: bytes) -> Itera
                 yield f"{file}: {key}: has {name} {result.get(name)!r}, but its records give {value!r}"
 
 
-def shorten(names: Sequence[str]) -> str:
-    """The first of many names, and the number of the others."""
-    return ", ".join(names[:MAX_NAMES]) + (f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else "")
-
-
 def has_same_environment(folders: Folders) -> bool:
     """Whether all results were made with the packages and the kind of processor of this process."""
     return {entry.environment for entry in Ledger(folders).entries()} == {reporting.environment()}
@@ -250,7 +247,7 @@ def compare_files(stored: Ledger, computed: Ledger) -> list[str]:
     different = [str(stored.folders.file(name)) for name in old | new if old.get(name) != new.get(name)]
     if different:
         count = f"{len(different)} of {len(old | new)} files differ from those recomputed from raw/"
-        raise NotReproduced(f"{count}: {shorten(different)}")
+        raise NotReproduced(f"{count}: {shorten(different, MAX_NAMES)}")
     return [f"recomputed from raw/: {len(new)} files are the same, byte for byte"]
 
 
@@ -260,7 +257,9 @@ def compare_numbers(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
     for key in old | new:
         for what in differences(key, old.get(key), new.get(key)):
             groups.setdefault(what, []).append(key)
-    counts = (f"{len(keys)} {what}" + (f" ({shorten(keys)})" if keys else "") for what, keys in groups.items())
+    counts = (
+        f"{len(keys)} {what}" + (f" ({shorten(keys, MAX_NAMES)})" if keys else "") for what, keys in groups.items()
+    )
     head = "recomputed from raw/ with another processor or packages, so compared by number and not by byte"
     text = f"{head}: of {len(new)} numbers {'; '.join(counts)}"
     if groups.keys() & {NEW, MISSING, WRONG}:

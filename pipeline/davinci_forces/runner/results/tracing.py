@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 
 from davinci_forces.errors import BadRequest
+from davinci_forces.runner.console import shorten
 from davinci_forces.runner.ledger import Folders, Ledger
 from davinci_forces.runner.results.dataframes import numbers_of
 
-MAX_TASKS = 3  # of a stage in one line
 DIGITS = 16  # of a hash, as the report prints them
 
 
@@ -39,7 +39,6 @@ def trace(folders: Folders, key: str) -> Iterator[str]:
             waiting += [name] if name not in seen else []
             seen.add(name)
     for stage, tasks in stages.items():
-        more = f" and {len(tasks) - MAX_TASKS} more" if len(tasks) > MAX_TASKS else ""
-        yield f"  by {stage}: {', '.join([*tasks][:MAX_TASKS])}{more}"
+        yield f"  by {stage}: {shorten([*tasks])}"
     for name, (is_own, sha) in sorted(raw.items(), key=lambda item: (not item[1][0], item[0])):
         yield f"  from {folders.file(name)}{'' if is_own else ', for the model'} (SHA-256 {sha[:DIGITS]})"
