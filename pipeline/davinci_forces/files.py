@@ -120,11 +120,8 @@ def write_folder(folder: Path, contents: Mapping[str, bytes], replaces: bool = F
                 names = [path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()]
             foreign = [name for name in names if name not in contents or not (folder / name).is_file()]
             if foreign or not replaces:
-                raise NotAFile(
-                    0,
-                    f"it exists, and holds {(foreign or names)[0]!r}; delete that, or name another folder",
-                    str(folder),
-                )
+                what = f"it exists, and holds {(foreign or names)[0]!r}"
+                raise NotAFile(0, f"{what}; delete that, or name another folder", str(folder))
             folder.rename(before)
         partial.rename(folder)
     finally:

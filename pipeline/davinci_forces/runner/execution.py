@@ -3,7 +3,7 @@
 import errno
 import os
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -52,7 +52,8 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
         with _writer(folders, task) as writer:
             for record in function_of(task.step)(**arguments(folders, task)):
                 writer.write(record)
-                messages += _messages(record)
+                if isinstance(record, Diagnostic):
+                    messages += [f"{s}: {t}" for s, t in zip(record.severity, record.text, strict=True) if s != "note"]
                 del record  # frees its memory before the stage makes the next
         return Outcome(task, _made(writer), messages=tuple(messages), seconds=perf_counter() - start)
     except Exception as error:
@@ -105,7 +106,7 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class InTurn(Collection[Record]):
+class InTurn:
     """Records that are read one by one and not kept, since all records of a long log would take much memory."""
 
     folders: Folders
@@ -117,9 +118,6 @@ class InTurn(Collection[Record]):
 
     def __len__(self) -> int:
         return len(self.located)
-
-    def __contains__(self, record: object) -> bool:
-        return any(record is member for member in self)
 
 
 def _record(folders: Folders, task: Task, located: Located) -> Record:
@@ -164,9 +162,3 @@ def _log(folders: Folders, entry: LogEntry) -> Log:
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
     files = [folders.raw / file for file in entry.files]
     return open_joined(files, entry.options) if entry.join else open_parts(files, entry.options)
-
-
-def _messages(record: Record) -> list[str]:
-    if not isinstance(record, Diagnostic):
-        return []
-    return [f"{s}: {t}" for s, t in zip(record.severity, record.text, strict=True) if s in ("warning", "error")]

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import date, time
 from enum import Enum
@@ -95,25 +95,18 @@ def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
 def schemas(step: str) -> dict[str, str]:
     """The hash of the declaration of each kind of record that a step reads or makes."""
     asks = declaration(step)
-    hashes = {kind.__name__: _hash(kind, _as_read) for kind in asks.reads}
-    return hashes | {kind.__name__: _hash(kind, _as_written) for kind in asks.makes}
+    hashes = {kind.__name__: _hash(kind, is_made=False) for kind in asks.reads}
+    return hashes | {kind.__name__: _hash(kind, is_made=True) for kind in asks.makes}
 
 
-def _hash(kind: type[Record], describe: Callable[[str, Any], tuple[str, ...]]) -> str:
-    columns = [describe(f.name, f.type) for f in fields(kind)]  # type: ignore[arg-type]
-    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, columns))
-
-
-def _as_read(name: str, type_: Any) -> tuple[str, ...]:
-    """What a reader of a field depends on: its name, type and unit."""
-    stored = str(np.dtype(COLUMN_DTYPES[type_])) if type_ in COLUMN_DTYPES else str(type_)
-    return name, stored, QUANTITIES[name].unit
-
-
-def _as_written(name: str, type_: Any) -> tuple[str, ...]:
-    """What the writer of a field depends on: also the meaning of a column, which is in the file."""
-    meaning = (QUANTITIES[name].meaning,) if type_ in COLUMN_DTYPES else ()
-    return *_as_read(name, type_), *meaning
+def _hash(kind: type[Record], is_made: bool) -> str:
+    """The hash of names, types and units, and for a step that makes it of the meanings of columns, as in the file."""
+    described = []
+    for f in fields(kind):  # type: ignore[arg-type]
+        is_column, (meaning, unit) = f.type in COLUMN_DTYPES, QUANTITIES[f.name]
+        stored = str(np.dtype(COLUMN_DTYPES[f.type])) if is_column else str(f.type)
+        described.append((f.name, stored, unit, *([meaning] if is_made and is_column else [])))
+    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, described))
 
 
 class File(NamedTuple):
@@ -137,18 +130,14 @@ def code(*modules: str, without: str = "") -> dict[str, str]:
 
     Modules in the package `without` are left out, unless they are named.
     """
-    files: dict[str, None] = {}
-    named = [name for module in modules for name in _files(module)]
-    _collect(named, files)
+    named = {name for module in modules for name in _files(module)}
+    files, waiting = set(named), list(named)
+    while waiting:
+        imported = set(_imports(waiting.pop())) - files
+        files |= imported
+        waiting += imported
     left_out = (f"{_place(without)}/",) if without else ()
     return {name: _package()[name].sha256 for name in sorted(files) if name in named or not name.startswith(left_out)}
-
-
-def _collect(names: Iterable[str], files: dict[str, None]) -> None:
-    for name in names:
-        if name not in files:
-            files[name] = None
-            _collect(_imports(name), files)
 
 
 @cache

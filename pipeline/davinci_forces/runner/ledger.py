@@ -199,12 +199,17 @@ def seal(entry: Entry) -> str:
     return text.removesuffix("\n}") + SEAL.format(hash_of_text(text))
 
 
-def check(entry: Entry, stage: str, name: str) -> Entry:
-    """Check that a run would write this entry under this stage and name, and return it.
+def _read(file: str) -> Entry:
+    """Read the entry in a file, if a run would write it there.
 
-    Raises ValueError if the entry is of another task, or names a file that no stage writes, which a run would remove.
-    Raises TypeError if a part of it has the wrong type.
+    Raises ValueError if its hash is wrong, it is of another task, or it names a file that no stage writes, which a run
+    would remove.  Raises TypeError if a part of it has the wrong type, and if the file cannot be read, other errors.
     """
+    text = read_bytes(file).decode()
+    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
+    if not text.endswith(SEAL.format(hash_of_text(content))):
+        raise ValueError("it is not as a stage wrote it")
+    entry = Entry(**json.loads(content))
     fingerprint = entry.fingerprint if isinstance(entry.fingerprint, dict) else {}
     tables = [entry.outputs, *map(fingerprint.get, PARTS)]
     if not all(isinstance(table, dict) for table in tables):
@@ -214,19 +219,9 @@ def check(entry: Entry, stage: str, name: str) -> Entry:
         texts += table.values()
     if {*map(type, texts)} != {str}:
         raise TypeError("it is not as a stage writes it")
-    if (entry.stage, file_name(entry.task)) != (stage, name):
+    if [entry.stage, f"{file_name(entry.task)}.json"] != file.split(os.sep)[-2:]:
         raise ValueError(f"it is of another task, {entry.stage} {entry.task}")
     for output in entry.outputs:
         if not OUTPUT.fullmatch(output):
             raise ValueError(f"it names {output!r} as an output, which no stage writes")
     return entry
-
-
-def _read(file: str) -> Entry:
-    """Read the entry in a file; raises as `check` does, and if the file cannot be read or its hash is wrong."""
-    text = read_bytes(file).decode()
-    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
-    if not text.endswith(SEAL.format(hash_of_text(content))):
-        raise ValueError("it is not as a stage wrote it")
-    stage, name = file.split(os.sep)[-2:]
-    return check(Entry(**json.loads(content)), stage, name.removesuffix(".json"))

@@ -147,7 +147,10 @@ class Plan:
         if asks.each:
             yield from self._each_record(asks, places, log)
         elif asks.per_log:
-            yield from self._each_log(asks, places, logs)
+            for name in logs:
+                of_log, others = ({p: places.find(k, name) for p, k in of.items()} for of in (asks.per_log, asks.every))
+                if any(of_log.values()):
+                    yield self._task(asks, name, of_log | others, name)
         elif "log" in asks.given.values():
             yield from (self._task(asks, name, {}, name) for name in logs)
         else:
@@ -164,13 +167,6 @@ class Plan:
             name = f"{KINDS[kind].folder()}/{name}" if len(kinds) > 1 else name
             yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
 
-    def _each_log(self, asks: Declaration, places: Places, logs: Iterable[str]) -> Iterator[Task]:
-        for log in logs:
-            of_log = {p: places.find(kinds, log) for p, kinds in asks.per_log.items()}
-            if any(of_log.values()):
-                others = {p: places.find(kinds, log) for p, kinds in asks.every.items()}
-                yield self._task(asks, log, {**of_log, **others}, log)
-
     def _task(
         self, asks: Declaration, name: str, records: dict[str, tuple[Located, ...]], log: str = "", joint: str = ""
     ) -> Task:
@@ -185,7 +181,9 @@ class Plan:
             if what != "log"
         }
         digests = {name: self.ledger.digest(name) for name in sorted(inputs)}
-        fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), code_of(asks), __version__)
+        readers = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # no stage imports them
+        run = code(module(stage_of(asks.name)), *RECORDS, *readers, without="davinci_forces.records")
+        fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), run, __version__)
         return Task(asks.name, name, fingerprint, records, values, self._joints)
 
     def _given(self, what: str, log: str, joint: str) -> Any:
@@ -201,12 +199,6 @@ class Plan:
         if (what, name) not in self._hashes:
             self._hashes[what, name] = hash_of(value)
         return self._hashes[what, name]
-
-
-def code_of(asks: Declaration) -> dict[str, str]:
-    """The code that a step runs, by hash."""
-    readers = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # no stage imports them
-    return code(module(stage_of(asks.name)), *RECORDS, *readers, without="davinci_forces.records")
 
 
 def log_of(asks: Declaration, task: str) -> str:

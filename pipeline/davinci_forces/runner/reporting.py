@@ -82,9 +82,8 @@ def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
     def read(kind: type[Record]) -> list[Record]:
         places = [place for name, place in located if name == kind.__name__]
         digests = [ledger.digest(f"processed/{place}") for place in places]
-        processed = ledger.folders.processed
-        located_digests = zip(places, digests, strict=True)
-        return [store.read(kind, processed, Path(place), sha, MAX_CACHED_ROWS) for place, sha in located_digests]
+        processed, stored = ledger.folders.processed, zip(places, digests, strict=True)
+        return [store.read(kind, processed, Path(place), sha, MAX_CACHED_ROWS) for place, sha in stored]
 
     return Catalogue(read)
 

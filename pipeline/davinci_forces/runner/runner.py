@@ -1,6 +1,5 @@
 """Run stages on a study: skip tasks that are up to date, and run each other task as soon as its inputs are there."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from davinci_forces.files import leftovers
 from davinci_forces.records import KINDS
 from davinci_forces.report import REPORT
 from davinci_forces.runner import reporting
-from davinci_forces.runner.console import Console
+from davinci_forces.runner.console import Console, shorten
 from davinci_forces.runner.execution import Outcome, perform
 from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, goes_by_log, required_steps, stages_of
 from davinci_forces.runner.ledger import INDEX, Entry, Folders, Ledger, file_name
@@ -149,10 +148,8 @@ class Runner:
         for entry in self.ledger.entries():
             self._before.setdefault(_part(entry.stage, entry.task), []).append(entry)
         self._progress = {part.step: Progress() for part in graph.parts}
-        self._open = Counter(map(stage_of, self._progress))  # number of steps of each stage that are not done
         for part in graph.parts:
             self._progress[part.step].unplanned += _has_tasks(part)
-        self._unchanged: list[str] = []  # lines that end the run
         self._due: dict[Part, int] = {}  # number of tasks that are not done
         while True:
             for batch in iter(graph.next, []):
@@ -163,7 +160,7 @@ class Runner:
                 self._record(outcome)
                 self._count_done(graph, _part(outcome.task.step, outcome.task.name))
         if self.ran or len(self._named) == 1:  # else `nothing to do` says it in one line
-            for line in self._unchanged:
+            for line in self._unchanged():
                 self.console.say(line)
 
     def _begin(self, graph: Graph, batch: Sequence[Part]) -> None:
@@ -189,20 +186,16 @@ class Runner:
         self._due[part] -= 1
         if not self._due[part]:
             graph.finish(part)
-            if part.log == ALL_LOGS:
-                self._conclude(stage_of(part.step))
 
-    def _conclude(self, stage: str) -> None:
-        """Note how many tasks of a named stage were up to date, once its last step is done."""
-        self._open[stage] -= 1
-        if self._open[stage] or stage not in self._named:
-            return
-        steps = [progress for step, progress in self._progress.items() if stage_of(step) == stage]
-        current, tasks = sum(step.current for step in steps), sum(step.tasks for step in steps)
-        if current:
-            self._unchanged.append(f"{stage}: {current} of {tasks} up to date")
-        if not tasks and len(self._named) == 1:  # a study need not have data for all stages
-            self._unchanged.append(f"{stage}: the study has no data for it")
+    def _unchanged(self) -> Iterator[str]:
+        """How many tasks of each named stage were up to date."""
+        for stage, steps in groupby(self._progress, stage_of):
+            counts = [(self._progress[step].current, self._progress[step].tasks) for step in steps]
+            current, tasks = map(sum, zip(*counts, strict=True))
+            if current and stage in self._named:
+                yield f"{stage}: {current} of {tasks} up to date"
+            if not tasks and {stage} == self._named:  # a study need not have data for all stages
+                yield f"{stage}: the study has no data for it"
 
     def _plan_part(self, part: Part) -> list[Task]:
         """The tasks of a part that have to run; outputs of its former tasks are removed."""
@@ -282,6 +275,4 @@ def _grouped(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
 
 def _listed(stage: str, tasks: list[str]) -> str:
     """A stage with the first names of its tasks; a task named like its stage is not repeated."""
-    if tasks == [stage]:
-        return stage
-    return f"{stage}: " + ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")
+    return stage if tasks == [stage] else f"{stage}: {shorten(tasks)}"

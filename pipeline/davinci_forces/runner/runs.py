@@ -128,7 +128,14 @@ def run(
         for line in runner.preview(names):
             terminal.say(line)
         return True
-    succeeded = run_on_cluster(runner, names, cluster) if cluster else runner.run(names)
+    if cluster:
+        from davinci_forces.runner.processes.cluster import connect, perform_there
+
+        with connect(cluster, places) as (executor, hands, terms):
+            runner.others, runner.perform = WorkerPool(lambda: executor, hands), partial(perform_there, terms)
+            succeeded = runner.run(names)
+    else:
+        succeeded = runner.run(names)
     if not runner.ran:
         terminal.say(f"{folder}: nothing to do, all stages are up to date")
     if REPORT in names:
@@ -136,15 +143,6 @@ def run(
     if not succeeded:
         echo(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
     return succeeded
-
-
-def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
-    """Run stages with the workers of a Dask cluster; raises as `connect` does, and as any run."""
-    from davinci_forces.runner.processes.cluster import connect, perform_there
-
-    with connect(address, runner.folders) as (executor, hands, terms):
-        runner.others, runner.perform = WorkerPool(lambda: executor, hands), partial(perform_there, terms)
-        return runner.run(names)
 
 
 def print_results(runner: Runner, folder: Path) -> None:

@@ -76,7 +76,7 @@ def function_of(step: str) -> Callable[..., Iterator[Record]]:
 def declaration(step: str) -> Declaration:
     """Read the signature of a step."""
     settings, hints = _signature(step)
-    declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, settings, _kinds(_inner(hints.pop("return"))))
+    declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, settings, _kinds(*get_args(hints.pop("return"))))
     for parameter, hint in hints.items():
         if parameter in declared.settings:
             continue
@@ -86,11 +86,11 @@ def declaration(step: str) -> Declaration:
         if hint in ARGUMENT_KINDS:
             declared.given[parameter] = ARGUMENT_KINDS[hint]
         elif get_origin(hint) in (Sequence, Collection):
-            declared.per_log[parameter] = _kinds(_inner(hint))
+            declared.per_log[parameter] = _kinds(*get_args(hint))
             if get_origin(hint) is Collection:
                 declared.in_turn.add(parameter)
         elif get_origin(hint) is Iterable:
-            declared.every[parameter] = _kinds(_inner(hint))
+            declared.every[parameter] = _kinds(*get_args(hint))
         elif type(None) in get_args(hint):
             declared.optional[parameter] = _kinds(hint)
         else:
@@ -117,10 +117,6 @@ def _signature(step: str) -> tuple[tuple[str, ...], dict[str, Any]]:
 def _source(stage: str) -> str:
     spec = find_spec(module(stage))
     return Path(str(spec and spec.origin)).read_text(encoding="utf-8")
-
-
-def _inner(hint: Any) -> Any:
-    return get_args(hint)[0] if get_origin(hint) in (Collection, Iterable, Iterator, Sequence) else hint
 
 
 def _kinds(hint: Any) -> Kinds:
