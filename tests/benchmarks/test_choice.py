@@ -39,7 +39,8 @@ def smoothed() -> list[Motion]:
                 "standing": zero,
                 "filled": zero,
             }
-            about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
+            columns |= dict.fromkeys(("sigma_q", "sigma_dq", "sigma_tau"), 0.0)
+            about = ("identification", RATE, "logged", 17.0, 0.0, 0)
             records.append(Motion(f"run{number}", joint.name, *about, **columns))
     return records
 

@@ -106,9 +106,9 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     motion, tau = wandering(3000, segments=2), np.random.default_rng(2).normal(size=(3000, 2))
     t, still = np.arange(3000) * T_S, np.zeros(3000, np.int64)
     columns = zip(("one", "two"), motion.q.T, motion.dq.T, motion.ddq.T, tau.T, strict=True)
-    about = ("identification", 1 / T_S, "logged", 4.0, 0.0, 0, 0.0, 0.0, 0.0)
+    about = ("identification", 1 / T_S, "logged", 4.0, 0.0, 0)
     records = [
-        Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still, still)
+        Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still, 0.0, 0.0, 0.0, still)
         for name, q, dq, ddq, own in columns
     ]
     log = observe(records, (), 4.0, 0)

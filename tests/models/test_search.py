@@ -44,9 +44,9 @@ def motion(added=(), noise=0.0, lag=0.0, seed=0) -> Motion:
     smooth = (lowpass(measured[0], RATE, 17.0), lowpass(measured[1], RATE, 17.0))
     tau = effort(t - lag) + 0.02 * random.normal(size=len(t))
     zero = np.zeros(len(t), np.int64)
-    about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
+    about = ("identification", RATE, "logged", 17.0, 0.0, 0)
     ddq = np.gradient(smooth[1], 1 / RATE)
-    return Motion("run", ROLL.name, *about, t, *smooth, ddq, *measured, tau, zero, zero, zero)
+    return Motion("run", ROLL.name, *about, t, *smooth, ddq, *measured, tau, zero, zero, 0.0, 0.0, 0.0, zero)
 
 
 def found(record: Motion, joint=ROLL):

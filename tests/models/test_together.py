@@ -38,7 +38,8 @@ def recorded(log: str, moving: list[int], seed: int) -> list[Motion]:
     for i, joint in enumerate(JOINTS):
         columns = {"t": t, "q": q[:, i], "dq": dq[:, i], "ddq": ddq[:, i], "tau": tau[:, i], "segment": zero}
         columns |= {"q_measured": q[:, i], "dq_measured": dq[:, i], "filled": zero, "standing": zero}
-        records.append(Motion(log, joint, *about, int(i not in moving), 0.0, 0.0, 0.0, **columns))
+        columns |= dict.fromkeys(("sigma_q", "sigma_dq", "sigma_tau"), 0.0)
+        records.append(Motion(log, joint, *about, int(i not in moving), **columns))
     return records
 
 

@@ -15,7 +15,8 @@ from davinci_forces.maths.models.physical import ROUNDING, Box
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.smoothing import measured_motion
 from davinci_forces.maths.signals.standstill import is_standing_still
-from davinci_forces.records import JointModel, Motion, Trajectory
+from davinci_forces.records import Trajectory
+from davinci_forces.records.recordings import FilteredMotion
 from davinci_forces.robots.robot import Joint
 
 
@@ -76,12 +77,12 @@ def averaged_motion(trajectory: Trajectory) -> ArmMotion:
     return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 
-def recorded_motion(record: Motion | JointModel) -> ArmMotion:
+def recorded_motion(record: FilteredMotion) -> ArmMotion:
     """Return the low-passed motion of a joint of one recording."""
     return ArmMotion(record.q[:, None], record.dq[:, None], record.ddq[:, None], 1.0 / record.rate, record.segment)
 
 
-def motion_at(record: Motion | JointModel, cutoff: float, effort_lag: float) -> ArmMotion:
+def motion_at(record: FilteredMotion, cutoff: float, effort_lag: float) -> ArmMotion:
     """Return the motion of a joint of one recording, low-passed at `cutoff` [Hz] and delayed by `effort_lag` [s]."""
     if (cutoff, effort_lag) == (record.cutoff, record.effort_lag):
         return recorded_motion(record)

@@ -2,17 +2,7 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records.record import (
-    Column,
-    Counts,
-    JointRecord,
-    Labels,
-    LogJointRecord,
-    Names,
-    Published,
-    Record,
-    slug,
-)
+from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Published, Record, slug
 
 
 class Fit(Record):
@@ -32,7 +22,7 @@ class Fit(Record):
     structure: str
     cutoff: tuple[float, ...]  # of each effort of the model
     effort_lag: tuple[float, ...]  # likewise
-    logs: Names
+    logs: tuple[str, ...]
     samples: int
     periods: int
     mse: float
@@ -111,8 +101,8 @@ class Identifiability(Record):
     group: str
     model: str
     scaled_condition: float
-    together: Names
-    not_seen: Names
+    together: tuple[str, ...]
+    not_seen: tuple[str, ...]
     advice: str
     parameter: Labels
     beside: Labels
@@ -174,7 +164,7 @@ class Choice(Record):
     chosen: str  # the candidate, by name
     best: str  # the candidate with the lowest score
     why: str
-    logs: Names
+    logs: tuple[str, ...]
     candidate: Labels
     variant: Labels
     parameters: Counts
@@ -197,7 +187,7 @@ class ModelSearch(JointRecord):
     cutoff: float
     effort_lag: float
     ridge: float
-    term: Names
+    term: tuple[str, ...]
     term_scale: tuple[float, ...]
     used: int
     chosen_step: int

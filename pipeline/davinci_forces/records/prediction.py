@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records.record import Column, Counts, LogJointRecord, Published
+from davinci_forces.records.recordings import FilteredMotion
 
 CHOSEN = "chosen"
 CHOSEN_BY_LOG = "chosen_by_log"  # the chosen model, refitted without whole logs instead of blocks of path
@@ -71,7 +72,7 @@ class PathShare(LogJointRecord):
     outside: float  # likewise
 
 
-class JointModel(LogJointRecord):
+class JointModel(FilteredMotion):
     """The model of one joint along one log, with the fit that the setting `fit` selects:
 
     inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
@@ -79,18 +80,12 @@ class JointModel(LogJointRecord):
 
     UNKNOWN = ("tau_hat_unseen",)
 
-    role: str
     model: str
     estimator: str
     stand_in: str
     path: str
     scheme: str  # of the refits without the samples; "" where there are none
     path_unseen: str
-    rate: float
-    velocity: str
-    cutoff: float
-    effort_lag: float  # by which the motion is delayed here
-    at_rest: int
     constant: float
     gravity_sine: float
     gravity_cosine: float
@@ -99,15 +94,6 @@ class JointModel(LogJointRecord):
     coulomb: float
     presliding: float
     static_friction: float
-    t: Column
-    q: Column
-    dq: Column
-    ddq: Column
-    q_measured: Column
-    dq_measured: Column
-    tau: Column
-    segment: Counts
-    standing: Counts
     unscored: Counts
     inertia: Column
     tau_known: Column

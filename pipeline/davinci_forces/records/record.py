@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadRecord
-from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Integers, row_blocks
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans, Integers, row_blocks
 
 Column = Array
 Counts = Integers
@@ -107,13 +107,17 @@ class Record:
 
     def part(self, which: slice) -> Self:
         """Return the record of some of the rows; that of a lazy record is lazy, too."""
-        scalars = {name: getattr(self, name) for name in self.scalars()}
         if read := self.__dict__.get("_read"):
+            scalars = {name: getattr(self, name) for name in self.scalars()}
             start, stop, _ = which.indices(len(self))
             return self.lazy(scalars, stop - start, lambda name, rows: read(name, slice(
                 start + (rows.start or 0), stop if rows.stop is None else start + rows.stop
             )))  # fmt: skip
-        return type(self)(**scalars, **{name: getattr(self, name)[which] for name in self.columns()})
+        return self.select(which)
+
+    def select(self, which: slice | Booleans | Integers) -> Self:
+        """Return the record of some of the rows, in memory."""
+        return self.like(self, **{name: getattr(self, name)[which] for name in self.columns()})
 
     def blocks(self) -> Iterator[Self]:
         """Yield the record, or one of many rows in parts."""

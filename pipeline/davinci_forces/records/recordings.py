@@ -80,12 +80,10 @@ class Signal(LogJointRecord):
     filled: Counts
 
 
-class Motion(LogJointRecord):
+class FilteredMotion(LogJointRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
-    The noise is what the filter removes.  The velocity `dq` is 0 where its sign is not known.  Where the joint stands
-    still, friction takes any value up to its static level, so that the effort is neither fitted nor judged there.
-    Samples that are filled in are not used either.
+    The motion is delayed by the lag of the effort.  The velocity `dq` is 0 where its sign is not known.
     """
 
     role: str
@@ -94,9 +92,6 @@ class Motion(LogJointRecord):
     cutoff: float
     effort_lag: float
     at_rest: int
-    sigma_q: float
-    sigma_dq: float
-    sigma_tau: float
     t: Column
     q: Column
     dq: Column
@@ -106,6 +101,18 @@ class Motion(LogJointRecord):
     tau: Column
     segment: Counts
     standing: Counts
+
+
+class Motion(FilteredMotion):
+    """The motion of one joint during one log, and the noise that the low-pass filter removes.
+
+    Where the joint stands still, friction takes any value up to its static level, so that the effort is neither fitted
+    nor judged there.  Samples that are filled in are not used either.
+    """
+
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
     filled: Counts
 
 

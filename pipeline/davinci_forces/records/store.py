@@ -66,13 +66,20 @@ class Writer:
         if place not in self._open:
             target = self.folder / place
             target.parent.mkdir(parents=True, exist_ok=True)
-            units = tuple(self.unit(record)(QUANTITIES[name].unit) for name in record.columns())
-            described = schema(type(record), units)  # type: ignore[arg-type]  # a class is hashable
+            column_units = tuple(self.unit(record)(QUANTITIES[name].unit) for name in record.columns())
+            described = schema(type(record), column_units)  # type: ignore[arg-type]  # a class is hashable
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
         described = self._open[place].schema
         columns = {f.name: _column(getattr(record, f.name), f.type) for f in described}
         self._open[place].write_table(pa.table(columns, described), BLOCK_SAMPLES)
-        self._described[place] = self._metadata(record)
+        values = {name: getattr(record, name) for name in record.scalars()}
+        units = {name: self.unit(record)(QUANTITIES[name].unit) for name in record.scalars()}
+        self._described[place] = {
+            "record": type(record).__name__,
+            "scalars": json.dumps(values, ensure_ascii=False),
+            "units": json.dumps(units, ensure_ascii=False),
+            "made_from": self.made_from,
+        }
         return place
 
     def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
@@ -89,16 +96,6 @@ class Writer:
                     file.close()
                 file.is_open = False  # otherwise the garbage collector closes it again and prints an error
                 self._unnamed(self.folder / place).unlink(missing_ok=True)
-
-    def _metadata(self, record: Record) -> dict[str, str]:
-        units = {name: self.unit(record)(QUANTITIES[name].unit) for name in record.scalars()}
-        values = {name: getattr(record, name) for name in record.scalars()}
-        return {
-            "record": type(record).__name__,
-            "scalars": json.dumps(values, ensure_ascii=False),
-            "units": json.dumps(units, ensure_ascii=False),
-            "made_from": self.made_from,
-        }
 
     @property
     def places(self) -> list[Path]:

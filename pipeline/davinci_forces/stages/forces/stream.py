@@ -16,6 +16,7 @@ from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_space
 from davinci_forces.maths.uncertainty.bootstrap import root_mean_square
 from davinci_forces.records import Contact, FilterNoise, Fit, JointModel, Motion, Streamed, StreamLevel, Track, by_name
+from davinci_forces.records.recordings import FilteredMotion
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -24,7 +25,7 @@ MEDIAN_STD = 1.2533  # standard error of a median over that of a mean, of normal
 LONG = 3.0  # a contact is long if it lasts this multiple of the delay
 
 
-def _motion(record: Motion | JointModel, cutoff: float, effort_lag: float) -> ArmMotion:
+def _motion(record: FilteredMotion, cutoff: float, effort_lag: float) -> ArmMotion:
     window = Window.design(record.rate, cutoff, effort_lag - record.effort_lag)
     columns, parts, q = np.empty((3, len(record))), list(segments(record.segment)), record.q_measured
     signals = ((record.dq_measured, 0), (record.dq_measured, 1)) if record.velocity == "logged" else ((q, 1), (q, 2))
