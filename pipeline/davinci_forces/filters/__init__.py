@@ -34,15 +34,12 @@ def title(name: str) -> str:
 def filter_parts(
     name: str, parts: Sequence[Recording], noise: NoiseModel, names: Sequence[str] = Tracked._fields
 ) -> Tracked:
-    """Run a filter over the parts of a recording between gaps; the filter restarts at each part.
-
-    Columns that are not named are empty.
-    """
+    """Run a filter over the parts of a recording between gaps; columns that are not named are empty."""
     return join_blocks(filter_blocks(name, parts, noise), sum(part.samples for part in parts), names)
 
 
 def filter_blocks(name: str, parts: Sequence[Recording], noise: NoiseModel) -> Iterator[Block]:
-    """Yield the blocks of a filter's pass over the parts of a recording."""
+    """Yield the blocks of a filter's pass over the parts of a recording; the filter restarts at each part."""
     start = 0
     for part in parts:
         for rows, tracked in _filter(name).blocks(part, noise):

@@ -74,10 +74,7 @@ def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
 
 
 def ramp_lag(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
-    """How late [s] the default filter shows a ramp of the effort on a joint at rest.
-
-    It is the area between a step and what the filter shows of it.
-    """
+    """How late [s] the default filter shows a ramp of the effort at rest: the area between a step and what it shows."""
     step = np.where(np.arange(round(2.0 * BEFORE / T_s) + 1) * T_s >= BEFORE, 1.0, 0.0)
     at_rest = joint_at_rest(np.full(len(step), inertia), viscous, step, T_s, initial_std=1.0)
     return T_s * float(np.sum(step - tracker(DEFAULT)(at_rest, noise).tau_ext))

@@ -28,10 +28,7 @@ MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest si
 
 
 class Identified:
-    """The fits of a robot's joints, chosen models and fitted paths.
-
-    `records` are those of these kinds that a stage has read.
-    """
+    """The fits of a robot's joints, chosen models and fitted paths, of those records that a stage has read."""
 
     def __init__(self, robot: Robot, records: Iterable[Fit | Choice | FittedPaths]) -> None:
         records = list(records)
@@ -213,10 +210,8 @@ class LogModels:
 
     def with_fit(self, model: JointModel, fit: Fit) -> JointModel:
         """Return a joint's model by another fit, without predictions of unseen data."""
-        unknown: dict[str, Any] = {
-            "scheme": "", "path_unseen": "", "tau_hat_unseen": np.broadcast_to(np.nan, len(model))
-        }  # fmt: skip
-        return JointModel.like(model, **self.fields_of(fit, model.joint), **unknown)
+        fields, unknown = self.fields_of(fit, model.joint), np.broadcast_to(np.nan, len(model))
+        return JointModel.like(model, **fields, scheme="", path_unseen="", tau_hat_unseen=unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:

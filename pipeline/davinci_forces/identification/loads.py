@@ -6,15 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.weighing import (
-    PARTS,
-    Rows,
-    error_between,
-    mirror_position,
-    moved_with,
-    tip_position,
-    unit_load,
-)
+from davinci_forces.maths.contact import weighing
+from davinci_forces.maths.contact.weighing import PARTS, Rows, error_between
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import refine
 from davinci_forces.maths.periods.repetition import harmonics_of, repetition
@@ -69,22 +62,15 @@ def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[
 
 
 def loads_per_kilogram(
-    chain: Chain,
-    robot: Robot,
-    moves_with: str,
-    position: tuple[float, float, float] | None,
-    motion: tuple[Array, Array, Array],
+    chain: Chain, robot: Robot, moves_with: str, position: Sequence[float] | None, motion: tuple[Array, Array, Array]
 ) -> tuple[Array, Array]:
-    """Joint effort of a kilogram (N, n) at a position on a joint or link, and at its mirror position on the link.
-
-    Without them, it is at the tip.
-    """
+    """Joint effort of a kilogram (N, n) at a position on a joint or link, or at the tip, and at its mirror position."""
     names = [joint.name for joint in robot.joints]
-    place = tip_position(chain, len(names)) if position is None else np.array(position)
+    place = weighing.tip_position(chain, len(names)) if position is None else np.array(position)
     link = moves_with or chain.links[int(chain.body[chain.names.index(chain.tip)]) - 1]
     if link in names:  # a joint, with which a link moves
-        link = moved_with(chain, names.index(link))
-    stated, opposite = (unit_load(chain, link, at, *motion) for at in (place, mirror_position(place)))
+        link = weighing.moved_with(chain, names.index(link))
+    stated, opposite = (weighing.unit_load(chain, link, at, *motion) for at in (place, weighing.mirror_position(place)))
     return stated, opposite
 
 
@@ -116,8 +102,8 @@ def unseen_part(load: Load) -> Load | None:
     unseen = np.isfinite(load.tau_ext_unseen)
     if unseen.sum() < MIN_ROWS:
         return None
-    columns = {name: getattr(load, name)[unseen] for name in load.columns()}
-    return replace(load, **{**columns, "tau_ext": columns["tau_ext_unseen"]})
+    part = load.select(unseen)
+    return replace(part, tau_ext=part.tau_ext_unseen)
 
 
 def rows_of(loads: Sequence[Load], sigma: dict[str, float], column: str) -> list[Rows]:
@@ -176,6 +162,5 @@ def subtract_joint_tare(load: Load, tare: Load, samples: float) -> Load:
         return replace(load, tau_ext=load.tau_ext - tare_effort)
     t = load.t - load.t[0] + tare.t[0] + samples / load.rate
     shared = (t >= tare.t[0]) & (t <= tare.t[-1])
-    columns = {name: getattr(load, name)[shared] for name in load.columns()}
-    columns["tau_ext"] = columns["tau_ext"] - np.interp(t[shared], tare.t, tare.tau_ext)
-    return replace(load, **columns)
+    part = load.select(shared)
+    return replace(part, tau_ext=part.tau_ext - np.interp(t[shared], tare.t, tare.tau_ext))

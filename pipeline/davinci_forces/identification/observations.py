@@ -8,7 +8,6 @@ import numpy as np
 
 from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
 from davinci_forces.identification.regression import averaged_motion, joined_motion, motion_at, stands_still
-from davinci_forces.identification.scores import select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import ArmMotion, Model
@@ -61,7 +60,7 @@ class Observed(NamedTuple):
             return self
         which = np.arange(number)  # a slice would keep the whole log in memory
         return self._replace(
-            records=tuple(select_samples(record, which) for record in self.records),
+            records=tuple(record.select(which) for record in self.records),
             **{name: getattr(self, name)[which] for name in ("still", "block", "period")},
         )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import ROWS, Estimator, Regression
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passed, white_std
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, model_error, root_mean_square
 from davinci_forces.records import Motion, Prediction
@@ -91,8 +91,3 @@ class Scorer:
 
     def _smoothed(self, x: Array) -> Array:
         return lowpass_segments(x, self.motion.segment, self.motion.rate, self.lowpass)
-
-
-def select_samples(motion: Motion, which: Booleans | Integers | slice) -> Motion:
-    """Return some of the samples (N,) of a recording."""
-    return replace(motion, **{name: getattr(motion, name)[which] for name in motion.columns()})

@@ -6,18 +6,17 @@ candidate is chosen by another scheme, which leaves blocks of path out.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
-from davinci_forces.estimators.problem import Estimator, Prior, Regression
+from davinci_forces.estimators.problem import Estimator, Prior
 from davinci_forces.identification.candidates import Candidate, CandidatePart
 from davinci_forces.identification.observations import Observed, averaged_samples, is_evaluated, observe, pose_samples
 from davinci_forces.identification.regression import known_of, pose, recorded_motion, stands_still
-from davinci_forces.identification.scores import Scorer, folds, select_samples
+from davinci_forces.identification.scores import Scorer, folds
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import efforts
@@ -46,7 +45,7 @@ def without_the_log(
     motion: Motion, average: Trajectory | None, cross_fits: Iterable[CrossFit], model: IndependentJoint, lowpass: float
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
-    part = motion if average is None else select_samples(motion, whole_periods(motion.t, average))
+    part = motion if average is None else motion.select(whole_periods(motion.t, average))
     scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white if average else None)
     along = recorded_motion(part)
     for fit in cross_fits:
@@ -76,22 +75,7 @@ def without_a_period(
     motion: Motion, average: Trajectory, model: IndependentJoint, prior: Prior, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; the path of the period is not left out."""
-    part = select_samples(motion, whole_periods(motion.t, average))
-    runs, others = without_folds(part, average, model, prior)
-    Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
-
-    def predict(estimate: Estimator) -> Array:
-        thetas = [estimate(regression).theta for regression in others]
-        return np.concatenate([Phi[run] @ theta for run, theta in zip(runs, thetas, strict=True)])
-
-    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white)
-    yield from without_parts(scorer, model, "leave one period out", SAME_PATH, predict)
-
-
-def without_folds(
-    part: Motion, average: Trajectory, model: IndependentJoint, prior: Prior
-) -> tuple[list[slice], list[Regression]]:
-    """Return the samples of each fold of a log's whole periods, and the least squares problem of the other folds."""
+    part = motion.select(whole_periods(motion.t, average))
     period = np.minimum(((part.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
     fold, measured = np.array(folds(average.periods))[period], part.filled == 0
     problem, moving = pose(model, average, prior), ~stands_still(average)
@@ -100,8 +84,13 @@ def without_folds(
         replace(problem, tau=effort.mean, tau_var=effort.var, periods=np.where(moving, effort.counts, 0))
         for effort in averaging.left_out(*samples)
     ]
-    ends = np.searchsorted(fold, np.arange(len(others) + 1)).tolist()
-    return [slice(start, end) for start, end in pairwise(ends)], others
+    Phi = np.split(model.regressor(recorded_motion(part)).Phi[:, 0], np.searchsorted(fold, np.arange(1, len(others))))
+
+    def predict(estimate: Estimator) -> Array:
+        return np.concatenate([rows @ estimate(rest).theta for rows, rest in zip(Phi, others, strict=True)])
+
+    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white)
+    yield from without_parts(scorer, model, "leave one period out", SAME_PATH, predict)
 
 
 def without_a_segment(
@@ -147,9 +136,8 @@ class RefitModel:
 
     def excites_all(self, cells: Equations, out: Booleans) -> bool:
         """Whether the cells of a refit excite every base parameter that all cells excite."""
-        return excited_parameters(cells.sum_groups([~out]), self._ridge) == excited_parameters(
-            sum_all(cells), self._ridge
-        )
+        left, every = cells.sum_groups([~out]), sum_all(cells)
+        return excited_parameters(left, self._ridge) == excited_parameters(every, self._ridge)
 
     def theta(self, cells: Equations, out: Booleans) -> Array:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
@@ -204,7 +192,7 @@ def predict_scheme(
     }
     for m, effort in enumerate(refits.model.efforts):
         i = log.joints.index(effort)
-        record = select_samples(log.records[i], is_predicted)
+        record = log.records[i].select(is_predicted)
         moves = is_evaluated(record)
         if not record.at_rest and moves.any():
             tau_hat = predicted[log.processing[i]][:, m]
