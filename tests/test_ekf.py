@@ -15,13 +15,14 @@ from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import (
     half_sine,
     lag_error,
+    likeliest_walk,
     noise_model,
     push_response_at_rest,
     response,
     smallest_q_tau,
+    tune_noise,
 )
 from davinci_forces.filters.stepping import covariances
-from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths import arrays
 from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of

@@ -65,11 +65,14 @@ def column(recording: Recording, of: Callable[[FilterInput], Array]) -> Array:
     return values
 
 
-def joint_at_rest(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
+def joint_at_rest(
+    inertia: Array | float, viscous: float, tau: Array, T_s: float, initial_std: float = 1.0
+) -> FilterInput:
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))
     coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))
-    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, initial_std)
+    dynamics = JointDynamics(np.full(len(tau), inertia), coefficients, still)
+    return FilterInput(dynamics, still, still, still, tau, T_s, initial_std)
 
 
 class NoiseModel(NamedTuple):

@@ -1,4 +1,8 @@
-"""The response of a filter to a push, and the smallest random walk q_tau with which the filter follows a push.
+"""The response of a filter to a push, and the noise that a filter assumes of a joint.
+
+The noise of position, velocity and drive maximises the likelihood of the innovations, on recordings in which nothing
+touches the robot (section 7.3).  The random walk q_tau of the external effort is the smallest one with which the filter
+follows a push.  Without external effort the likeliest walk would be 0, and the filter would then not follow any.
 
 The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, and peaks no later than
 the setting `delay` after the peak of the push.  `q_tau` of a `NoiseModel` is the random walk per sample; `walk` and the
@@ -11,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, filter_parts, tracker
+from davinci_forces.filters import DEFAULT, ekf, filter_parts, tracker
 from davinci_forces.filters.problem import Filter, FilterInput, LongInput, NoiseModel, Recording, column, joint_at_rest
 from davinci_forces.maths.arrays import Array, row_blocks
 from davinci_forces.maths.constants import PUSH_DELAY
@@ -27,6 +31,9 @@ WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, in units of inertia * velocit
 MIN_TRIAL_RATE = 5000.0  # [Hz] in a trial, samples of a faster log are taken together
 BISECTIONS = 60  # halvings of the logarithmic search range
 CACHED_WALKS = 256  # size of a cache: all stages and logs of a joint need the same few results
+ROUNDS = 4  # number of rounds that fit the likelihood and the push in turn
+MAX_LOG_CHANGE = np.log(1e3)  # largest change of a standard deviation's logarithm from the start of the search
+MAX_SAMPLES_TUNING = 20_000  # at most this number of each recording's samples is used
 
 
 class Response(NamedTuple):
@@ -53,8 +60,7 @@ def response(change: Array, t: Array, start: float, peak: float) -> Response:
 def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> Response:
     """Compute the response of a filter to a push on a joint at rest, where the filter is linear."""
     t = np.asarray(T_s * np.arange(round((BEFORE + DURATION + AFTER) / T_s) + 1), np.float64)
-    pushed = joint_at_rest(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, initial_std=1.0)
-    return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
+    return response(track(joint_at_rest(inertia, viscous, half_sine(t, BEFORE), T_s), noise).tau_ext, t, BEFORE, 1.0)
 
 
 def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
@@ -67,7 +73,7 @@ def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
     inertia = float(np.mean(column(recording, lambda part: part.joint.inertia)))
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
     step = np.where(t >= BEFORE, 1.0, 0.0)
-    stepped = joint_at_rest(np.full(len(t), inertia), joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
+    stepped = joint_at_rest(inertia, joint.coefficients[VISCOUS], step, T_s)
     shown = np.maximum.accumulate(track(stepped, noise).tau_ext)
     lower, upper = np.interp([0.25 * shown[-1], 0.75 * shown[-1]], shown, t)
     return float(2.0 * (upper - lower) / STEP_WIDTH)
@@ -76,7 +82,7 @@ def rise(track: Filter, recording: Recording, noise: NoiseModel) -> float:
 def ramp_lag(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
     """How late [s] the default filter shows a ramp of the effort at rest: the area between a step and what it shows."""
     step = np.where(np.arange(round(2.0 * BEFORE / T_s) + 1) * T_s >= BEFORE, 1.0, 0.0)
-    at_rest = joint_at_rest(np.full(len(step), inertia), viscous, step, T_s, initial_std=1.0)
+    at_rest = joint_at_rest(inertia, viscous, step, T_s)
     return T_s * float(np.sum(step - tracker(DEFAULT)(at_rest, noise).tau_ext))
 
 
@@ -103,9 +109,59 @@ def smallest_q_tau(
 
 def steady_std(inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
     """Compute the standard deviation of the external effort on a joint at rest, once the filter has converged."""
-    still = np.zeros(round(BEFORE / T_s) + 1)
-    at_rest = joint_at_rest(np.full(len(still), inertia), viscous, still, T_s, initial_std=1.0)
+    at_rest = joint_at_rest(inertia, viscous, np.zeros(round(BEFORE / T_s) + 1), T_s)
     return float(tracker(DEFAULT)(at_rest, noise).tau_ext_std[-1])
+
+
+def tune_noise(
+    recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float, delay: float = PUSH_DELAY
+) -> NoiseModel:
+    """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
+
+    `inertia` is the largest along the recordings: with the largest inertia the filter is slowest.
+    The filter shows a push within `delay` [s].
+    """
+    from scipy.optimize import minimize
+
+    T_s = recordings[0].T_s
+    parts = [recording.part(slice(MAX_SAMPLES_TUNING)) for recording in recordings]
+    noise, center = start, np.log([start.r_q, start.r_dq, start.q_dq])
+    change = np.zeros(len(center))
+    for _ in range(ROUNDS):
+        noise = noise._replace(q_tau=smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay))
+        walk = noise.q_tau
+
+        def cost(change: Array, walk: float = walk) -> float:
+            if np.abs(change).max() > MAX_LOG_CHANGE:
+                return np.inf
+            return -sum(ekf.log_likelihood(part, noise_of(center + change, walk)) for part in parts)
+
+        # The first simplex is wide, because the likelihood may be flat near its start.
+        simplex = change + np.vstack([np.zeros(3), 0.5 * np.eye(3)])
+        change = minimize(
+            cost, change, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
+        ).x
+        noise = noise_of(center + change, walk)
+    return noise._replace(q_tau=smallest_q_tau(tracker(DEFAULT), inertia, viscous, T_s, noise, delay))
+
+
+def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:
+    """Return the noise from the logarithms of its standard deviations r_q, r_dq and q_dq."""
+    r_q, r_dq, q_dq = np.exp(logarithms).tolist()
+    return NoiseModel(r_q, r_dq, 0.0, q_dq, q_tau)
+
+
+def likeliest_walk(recordings: Sequence[FilterInput], noise: NoiseModel) -> float:
+    """Find the `q_tau` of greatest likelihood, for recordings with external effort, as in section 7.3."""
+    from scipy.optimize import minimize_scalar
+
+    def cost(logarithm: float) -> float:
+        walk = noise._replace(q_tau=float(np.exp(logarithm)))
+        return -sum(ekf.log_likelihood(part, walk) for part in recordings)
+
+    start = np.log(noise.q_tau or float(np.std(recordings[0].tau)) * recordings[0].T_s)
+    best = minimize_scalar(cost, bounds=(start - MAX_LOG_CHANGE, start + MAX_LOG_CHANGE), method="bounded")
+    return float(np.exp(best.x))
 
 
 def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name: str = DEFAULT) -> NoiseModel:

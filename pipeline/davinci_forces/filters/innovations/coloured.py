@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.filters import ekf, kalman
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.tuning import MAX_LOG_CHANGE
+from davinci_forces.filters.response import MAX_LOG_CHANGE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import TRANSIENT
 

@@ -16,7 +16,7 @@ import numpy as np
 from davinci_forces.filters import DEFAULT, tracker
 from davinci_forces.filters.innovations import coloured
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.tuning import likeliest_walk
+from davinci_forces.filters.response import likeliest_walk
 from davinci_forces.maths.arrays import Array, Booleans, runs
 from davinci_forces.maths.signals.whiteness import tests
 from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient
@@ -107,10 +107,14 @@ class Subject:
 
     def pieces(self, without: tuple[str, ...], free: Booleans, moving: Booleans) -> tuple[list[Array], list[Array]]:
         """Return the settled innovations of position and velocity, run by run."""
-        pieces_q, pieces_dq = [], []
+        noise, pieces_q, pieces_dq = self.likeliest_noise(without), [], []
         for run in self.runs(free):
             part = self.run_under_model(without).part(run)
-            i_q, i_dq = self.innovations(without, part)
+            if COLOUR in without:
+                i_q, i_dq = coloured.innovations(part, noise)
+            else:
+                tracked = tracker(DEFAULT)(part, noise.white)
+                i_q, i_dq = tracked.innovation_q, tracked.innovation_dq
             for piece in runs(is_past_transient(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
                 if piece.stop - piece.start > LAGS:
                     pieces_q.append(i_q[piece])
@@ -122,14 +126,6 @@ class Subject:
         T_s = next(iter(self.models.values())).T_s
         long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * TRANSIENT]
         return long or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
-
-    def innovations(self, without: tuple[str, ...], part: FilterInput) -> tuple[Array, Array]:
-        """Compute the innovations of one run."""
-        noise = self.likeliest_noise(without)
-        if COLOUR in without:
-            return coloured.innovations(part, noise)
-        tracked = tracker(DEFAULT)(part, noise.white)
-        return tracked.innovation_q, tracked.innovation_dq
 
     def likeliest_noise(self, without: tuple[str, ...]) -> coloured.Noise:
         """Return the noise in use, or that of greatest likelihood if noise is a removed cause."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from davinci_forces.filters import DEFAULT, ekf, tracker
 from davinci_forces.filters.problem import NoiseModel, filter_inputs
-from davinci_forces.filters.response import smallest_q_tau, steady_std
-from davinci_forces.filters.tuning import tune_noise
+from davinci_forces.filters.response import smallest_q_tau, steady_std, tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning, by_name
 
