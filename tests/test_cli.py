@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces import __version__, commands
-from davinci_forces.cli import app
+from davinci_forces.cli import app, escape_tags
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.runner import ALL, runs
 from davinci_forces.stages import GROUPS, module
@@ -70,9 +70,8 @@ def test_a_stage_is_explained_by_its_own_module(name):
 
 
 def test_a_code_span_is_shown_without_a_backslash():
-    @(other := typer.Typer(rich_markup_mode="markdown")).command(cls=type(EVERY["fit"]))
-    def command(study: str) -> None:
-        """Writes `raw/<study>` and <log>."""
+    @(other := typer.Typer(rich_markup_mode="markdown")).command(help=escape_tags("Writes `raw/<study>` and <log>."))
+    def command(study: str) -> None: ...
 
     shown = CliRunner().invoke(other, ["--help"], env={"COLUMNS": "200", "TERM": "dumb"}).output
     assert "Writes raw/<study> and <log>." in shown

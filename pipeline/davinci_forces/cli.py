@@ -41,6 +41,10 @@ class CommandLine(TyperGroup):
     """The command line, with its commands in panels.  The stages share one command under different names and help."""
 
     def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
+        for command in commands.values():
+            for element in (command, *command.params):
+                if element.help:
+                    element.help = escape_tags(element.help)
         stage = commands.pop(STAGE)
         commands[REPORT] = copy_command(stage, REPORT, "davinci_forces.report.report", FIRST_PANEL)
         for group, stages in GROUPS.items():
@@ -84,17 +88,6 @@ Cluster = Annotated[
 DryRun = Annotated[bool, Option("--dry-run", help="Print what would run and why, and change nothing.")]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print warnings and errors only.")]
 Verbose = Annotated[bool, Option("--verbose", "-v", help="Also print the time of each task as it ends.")]
-
-
-class ShownAsWritten(TyperCommand):
-    """A command whose help shows <study> as it is written."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        for element in (self, *self.params):
-            text = getattr(element, "help", None)
-            if text and self.rich_markup_mode == "markdown":
-                vars(element)["help"] = escape_tags(text)
 
 
 def main() -> None:
@@ -217,7 +210,7 @@ def run_stages(study: Path, names: tuple[str, ...], *options: Any) -> bool:
         return False
 
 
-@app.command(STAGE, cls=ShownAsWritten)
+@app.command(STAGE)
 @errors_as_messages()
 def run_named(
     context: typer.Context,
@@ -240,7 +233,7 @@ def run_named(
         raise typer.Exit(1)
 
 
-@app.command("all", rich_help_panel=FIRST_PANEL, cls=ShownAsWritten)
+@app.command("all", rich_help_panel=FIRST_PANEL)
 @errors_as_messages()
 def run_all(
     studies: Studies = None,
@@ -266,5 +259,5 @@ def run_all(
 for name in COMMANDS:
     command_module = import_module(f"davinci_forces.commands.{name}")
     panel = FIRST_PANEL if name in FIRST_COMMANDS else LAST_PANEL
-    command = app.command(name, help=command_module.__doc__, rich_help_panel=panel, cls=ShownAsWritten)
+    command = app.command(name, help=command_module.__doc__, rich_help_panel=panel)
     command(errors_as_messages()(command_module.run))
