@@ -14,7 +14,6 @@ MIN_PERIODS = 4  # fewer periods do not determine their variance
 DEGREES = 200  # degrees of freedom of each weight, which give it an uncertainty of 10 %
 MIN_EXCESS_Z = 3.0  # [standard errors] least excess of the residuals over the noise that is the model's error
 MIN_EXCESS_SHARE = 0.05  # the same as a share of the noise: the pooled variance is not known better
-MAX_STEPS_WLSE = 100
 
 
 def estimate(problem: Regression) -> Estimate:
@@ -44,18 +43,14 @@ def estimate(problem: Regression) -> Estimate:
 def add_model_error(weight: Array, residual: Array, degrees: int) -> Array:
     """Add the variance s^2 of the model's error to the weights (K,): 1/w + s^2 in place of 1/w.
 
-    s^2 solves f = sum of r^2 / (1/w + s^2) = K - p.  (Paule and Mandel, 1982)  Newton's method on 1/f, which is concave
-    in s^2 and a straight line where 1/w is constant, converges from below.
+    s^2 solves sum of r^2 / (1/w + s^2) = K - p, between 0 and the sum of r^2 / (K - p).  (Paule and Mandel, 1982)
     """
+    from scipy.optimize import brentq
+
     valid = weight > 0
-    noise, squares, s2 = 1.0 / weight[valid], residual[valid] ** 2, 0.0
-    for _ in range(MAX_STEPS_WLSE):
-        share = squares / (noise + s2)
-        f = float(share.sum())
-        step = f / degrees * (f - degrees) / float((share / (noise + s2)).sum())
-        s2 += step
-        if step <= 1e-12 * s2:
-            break
+    noise, squares = 1.0 / weight[valid], residual[valid] ** 2
+    most = float(squares.sum()) / degrees
+    s2 = brentq(lambda s2: float((squares / (noise + s2)).sum()) - degrees, 0.0, most, xtol=1e-14 * most)
     out = np.zeros_like(weight)
     out[valid] = 1.0 / (noise + s2)
     return out
