@@ -3,8 +3,6 @@
 import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression, standard_errors
-from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import Triangle
 
 NAME = "least squares with a prior"
 STRENGTHS = np.geomspace(1e-32, 1e3, 141)  # lambda, for columns of unit length
@@ -18,14 +16,8 @@ def estimate(problem: Regression) -> Estimate:
     likelihood of the data, with one variance of the parameters around theta_0 and one of the effort around Phi theta
     (MacKay, 1992).  The standard errors are those of least squares, without the information of the guess.
     """
-    R = problem.triangle
+    R, K = problem.triangle, int(np.count_nonzero(problem.weight))
     guess = np.zeros(len(R.y)) if problem.known.guess is None else problem.known.guess
-    theta = fit_with_prior(R, guess, int(np.count_nonzero(problem.weight)))
-    return Estimate(theta, lambda: standard_errors(problem, theta))
-
-
-def fit_with_prior(R: Triangle, guess: Array, K: int) -> Array:
-    """Fit the parameters (p,) under the most likely strength of the penalty."""
     d = np.where(guess != 0, np.abs(guess), np.linalg.norm(R.y) / R.scale)
     A, size, B = np.linalg.svd(R.U * (R.scale * d))
     along = A.T @ (R.y - R.U @ (guess * R.scale))
@@ -34,4 +26,5 @@ def fit_with_prior(R: Triangle, guess: Array, K: int) -> Array:
     squares = (along**2 / share).sum(axis=1) + R.min_squares
     cost = K * np.log(np.maximum(squares, np.finfo(float).tiny)) + np.log(share).sum(axis=1)
     best = strength[int(cost.argmin())]
-    return np.asarray(guess + d * (B.T @ (size / (size**2 + best) * along)))
+    theta = np.asarray(guess + d * (B.T @ (size / (size**2 + best) * along)))
+    return Estimate(theta, lambda: standard_errors(problem, theta))
