@@ -35,10 +35,20 @@ def left_out(
     model, prior = independent(joint), known_of(joint)
     if refits:
         yield from without_the_log(motion, average, refits, model, lowpass)
-    elif average is not None:
-        yield from without_a_period(motion, average, model, prior, lowpass)
+        return
+    if average is None:
+        part, scheme, path, white = motion, "leave a segment out", ANOTHER_PATH, None
+        predict = without_a_segment(motion, model, prior, lowpass)
     else:
-        yield from without_a_segment(motion, model, prior, lowpass)
+        part, scheme, path = motion.select(whole_periods(motion.t, average)), "leave one period out", SAME_PATH
+        predict, white = without_a_period(part, average, model, prior), average.sigma_tau_white
+    scorer = Scorer(part, is_evaluated(part), lowpass, white)
+    for name in ESTIMATORS:
+        try:
+            yield scorer.score(model.name, name, scheme, path, predict(estimator(name)))
+        except NotIdentifiable as error:
+            text = f"{name} has no leave-out score, because a refit is not possible: {error}"
+            yield diagnostic("fit", f"{motion.log}.{motion.joint}", "note", f"{motion.log}/{motion.joint}: {text}")
 
 
 def without_the_log(
@@ -58,24 +68,10 @@ def without_the_log(
             yield scorer.score(fit.model, fit.estimator, scheme, ANOTHER_PATH, tau_hat)
 
 
-def without_parts(
-    scorer: Scorer, model: IndependentJoint, scheme: str, path: str, predict: Callable[[Estimator], Array]
-) -> Iterator[Prediction | Diagnostic]:
-    """Score what refits by each estimator predict of the parts of a log that they leave out, or note why they fail."""
-    log, joint = scorer.motion.log, scorer.motion.joint
-    for name in ESTIMATORS:
-        try:
-            yield scorer.score(model.name, name, scheme, path, predict(estimator(name)))
-        except NotIdentifiable as error:
-            text = f"{log}/{joint}: {name} has no leave-out score, because a refit is not possible: {error}"
-            yield diagnostic("fit", f"{log}.{joint}", "note", text)
-
-
 def without_a_period(
-    motion: Motion, average: Trajectory, model: IndependentJoint, prior: Prior, lowpass: float
-) -> Iterator[Prediction | Diagnostic]:
-    """Predict each period of a log from fits to the other periods; the path of the period is not left out."""
-    part = motion.select(whole_periods(motion.t, average))
+    part: Motion, average: Trajectory, model: IndependentJoint, prior: Prior
+) -> Callable[[Estimator], Array]:
+    """Return how an estimator predicts each period of a log from fits to the others, which repeat the period's path."""
     period = np.minimum(((part.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
     fold, measured = np.array(folds(average.periods))[period], part.filled == 0
     problem, moving = pose(model, average, prior), ~stands_still(average)
@@ -89,14 +85,13 @@ def without_a_period(
     def predict(estimate: Estimator) -> Array:
         return np.concatenate([rows @ estimate(rest).theta for rows, rest in zip(Phi, others, strict=True)])
 
-    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white)
-    yield from without_parts(scorer, model, "leave one period out", SAME_PATH, predict)
+    return predict
 
 
 def without_a_segment(
     motion: Motion, model: IndependentJoint, prior: Prior, lowpass: float
-) -> Iterator[Prediction | Diagnostic]:
-    """Predict each sixth of a log that does not repeat from fits to the other five."""
+) -> Callable[[Estimator], Array]:
+    """Return how an estimator predicts each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
     Phi = model.regressor(recorded_motion(motion)).Phi[:, 0]
 
@@ -106,8 +101,7 @@ def without_a_segment(
             tau_hat[out] = Phi[out] @ estimate(pose_samples(model, log, ~out, prior)[0]).theta
         return tau_hat
 
-    scorer = Scorer(motion, is_evaluated(motion), lowpass)
-    yield from without_parts(scorer, model, "leave a segment out", ANOTHER_PATH, predict)
+    return predict
 
 
 def whole_periods(t: Array, average: Trajectory) -> slice:
