@@ -242,15 +242,6 @@ class OnlineJoint:
         """Whether the filter has run long enough to have forgotten how it began."""
         return bool(self.steps * self.T_s > TRANSIENT)
 
-    def effort(self, q: float, dq: float, ddq: float, of_links: float) -> float:
-        """The model's effort at a motion, with the effort of the links."""
-        values = (1.0, math.sin(q), math.cos(q), q, dq, sign(dq))
-        tau = of_links
-        for term, memory in zip(self.terms, self.z, strict=True):
-            z = _state(term, memory, q, dq)
-            tau += term.value * (term.acceleration * ddq + sum(map(float.__mul__, term.c, (*values, z))))
-        return tau
-
     def step(
         self, y: tuple[float, float], motion: Sequence[float], tau: float, of_links: float, M: float
     ) -> tuple[float, ...]:
@@ -261,7 +252,10 @@ class OnlineJoint:
         """
         q, dq, ddq = motion
         M += sum(t.value * t.acceleration for t in self.terms)
-        tau_hat = self.effort(q, dq, ddq, of_links)
+        tau_hat = of_links + sum(
+            t.value * (t.acceleration * ddq + bias(t.c, q, dq, _state(t, z, q, dq))[0])
+            for t, z in zip(self.terms, self.z, strict=True)
+        )
         known = tau_hat - M * ddq - bias(self.c, q, dq, 0.0)[0]
         if self.belief is None:
             self.belief = first(y[0], y[1], math.sqrt(self.R[0]), math.sqrt(self.R[1]), self.initial_std)
