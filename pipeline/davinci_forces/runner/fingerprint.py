@@ -9,7 +9,7 @@ from enum import Enum
 from functools import cache
 from hashlib import sha256
 from pathlib import Path, PurePath
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -109,18 +109,10 @@ def _hash(kind: type[Record], is_made: bool) -> str:
     return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, described))
 
 
-class File(NamedTuple):
-    """A file of the package."""
-
-    sha256: str
-    imports: list[tuple[str, list[str]]]  # modules of the pipeline, and the names from them
-    by_name: bool  # whether it imports others by name
-
-
 @cache
 def package_fingerprint() -> str:
     """The fingerprint of the package's code, 12 digits: the same from a wheel and from a checkout."""
-    listed = sorted(f"{file.sha256}  {name}\n" for name, file in _package().items())
+    listed = sorted(f"{sha}  {name}\n" for name, (sha, _) in _package().items())
     return sha256("".join(listed).encode()).hexdigest()[:12]
 
 
@@ -137,12 +129,12 @@ def code(*modules: str, without: str = "") -> dict[str, str]:
         files |= imported
         waiting += imported
     left_out = (f"{_place(without)}/",) if without else ()
-    return {name: _package()[name].sha256 for name in sorted(files) if name in named or not name.startswith(left_out)}
+    return {name: _package()[name][0] for name in sorted(files) if name in named or not name.startswith(left_out)}
 
 
 @cache
 def _imports(file: str) -> tuple[str, ...]:
-    imports = ((module, name) for module, names in _package()[file].imports for name in names)
+    imports = ((module, name) for module, names in find_imports(_package()[file][1]) for name in names)
     return tuple(file for module, name in imports for file in _files(f"{module}.{name}") or _files(module))
 
 
@@ -165,7 +157,8 @@ def _files(module: str) -> list[str]:
     init = f"{place}/__init__.py"
     if init not in package:
         return []
-    return [name for name in package if name.startswith(f"{place}/")] if package[init].by_name else [init]
+    by_name = "import_module" in package[init][1]
+    return [name for name in package if name.startswith(f"{place}/")] if by_name else [init]
 
 
 def _place(module: str) -> str:
@@ -174,14 +167,13 @@ def _place(module: str) -> str:
 
 
 @cache
-def _package() -> dict[str, File]:
-    """All files of the package, each read once, by their paths below it."""
+def _package() -> dict[str, tuple[str, str]]:
+    """The hash of each file of the package, and the source of a module, by the path below the package."""
     files = {}
     for folder, _, names in os.walk(PACKAGE):  # takes a third of the time of rglob
         place = folder.removeprefix(str(PACKAGE)).replace(os.sep, "/").lstrip("/")
         for name in names if not place.endswith("__pycache__") else ():
             content = read_bytes(f"{folder}{os.sep}{name}")
             source = content.decode() if name.endswith(".py") else ""
-            file = File(sha256(content).hexdigest(), [*find_imports(source)], "import_module" in source)
-            files[f"{place}/{name}".lstrip("/")] = file
+            files[f"{place}/{name}".lstrip("/")] = sha256(content).hexdigest(), source
     return dict(sorted(files.items()))

@@ -24,8 +24,8 @@ ARGUMENT_KINDS = {
     Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
 }  # fmt: skip
 SETTINGS = tuple(f.name for f in fields(Settings))
-GENERIC = {kind.__name__: kind for kind in (Collection, Iterable, Iterator, Sequence)}
-TYPES = KINDS | GENERIC | {kind.__name__: kind for kind in ARGUMENT_KINDS} | {"Annotated": Annotated}
+GENERIC = (Collection, Iterable, Iterator, Sequence)
+TYPES = KINDS | {kind.__name__: kind for kind in (*GENERIC, *ARGUMENT_KINDS)} | {"Annotated": Annotated}
 
 
 @dataclass(frozen=True)
