@@ -175,8 +175,15 @@ class IdentifiedArm:
         models = [model for model in reading(JointModel) if model.log == NEW]
         if not models:
             raise BadRequest("\n".join(["the effort of no joint is predicted", *new_texts(reading)]))
-        predictions = {model.joint: self._prediction(model) for model in models}
-        return pd.concat(list(predictions.values()), keys=list(predictions), axis=1, names=["joint", ""])
+        predictions: dict[str, pd.DataFrame] = {}
+        for model in models:
+            std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
+            if band is not None:
+                smoothed = np.full(len(model), np.sqrt(np.mean(band.tau_ext_std_filter**2)))
+                std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False)[0])
+            columns = {"tau": model.tau_hat, "std": std}
+            predictions[model.joint] = pd.DataFrame(columns, index=pd.Index(model.t, name="t"))
+        return pd.concat([*predictions.values()], keys=[*predictions], axis=1, names=["joint", ""])
 
     def external_effort(
         self, t: Samples, q: Samples, tau: Samples, dq: Samples = None, *, free: Windows = (), contact: Windows = ()
@@ -254,13 +261,6 @@ class IdentifiedArm:
 
     def _effort_label(self, joint: str) -> str:
         return f"effort [{self.robot.joint(joint).unit('{effort}')}]"
-
-    def _prediction(self, model: JointModel) -> pd.DataFrame:
-        std, band = np.full(len(model), np.nan), self._bands.get(model.joint)
-        if band is not None:
-            smoothed = np.full(len(model), np.sqrt(np.mean(band.tau_ext_std_filter**2)))
-            std = np.sqrt(total_variance(band, model.log, model.path, model.dq, smoothed, False)[0])
-        return pd.DataFrame({"tau": model.tau_hat, "std": std}, index=pd.Index(model.t, name="t"))
 
     def _saved(
         self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED, **windows: Any

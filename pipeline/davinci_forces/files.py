@@ -160,8 +160,6 @@ def leftovers(folder: Path) -> Iterator[Path]:
     for home, folders, files in os.walk(folder):  # takes a third of the time of rglob
         for name in folders:
             if os.path.islink(link := os.path.join(home, name)):
-                raise BadRequest(
-                    f"{link} is a link to {os.readlink(link)}, and a run writes no results through links; remove it, "
-                    "or choose other folders with --processed and --reports"
-                )
+                why = f"{link} is a link to {os.readlink(link)}, and a run writes no results through links"
+                raise BadRequest(f"{why}; remove it, or choose other folders with --processed and --reports")
         yield from (Path(home, file) for file in files if file.endswith(PARTIAL))

@@ -108,7 +108,8 @@ def test_scores_of_all_cutoffs_are_of_the_same_effort():
     log = observe([motion(noise=1e-3)], (), 17.0, 0)
     model = independent(ROLL)
     squares = [
-        library(model, [log.process([Processing(cutoff, 0.0)])], 1).cells.scored.squares for cutoff in (6.0, 17.0, 30.0)
+        library(model, [log._replace(processing=(Processing(cutoff, 0.0),))], 1).cells.scored.squares
+        for cutoff in (6.0, 17.0, 30.0)
     ]
     for other in squares[1:]:
         np.testing.assert_allclose(other, squares[0], rtol=1e-12)

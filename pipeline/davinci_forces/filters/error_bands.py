@@ -20,8 +20,8 @@ def total_variance(
     Without such logs, the larger errors on another path are used.  If there is no other log, the variance of a block is
     that of the other blocks.  `is_centred` is for efforts whose day offset was subtracted.
     """
-    source, others = np.asarray(band.source).astype(str), np.asarray(band.source).astype(str) != log
-    kinds, errors = np.asarray(band.path_of).astype(str), free_errors(band, is_centred)
+    source, kinds, errors = band.source.astype(str), band.path_of.astype(str), free_errors(band, is_centred)
+    others = source != log
     for which in (others & (kinds == path), others & (kinds == ANOTHER_PATH), others):
         if which.any():
             calibration = calibrate(errors.select(which))
@@ -39,7 +39,7 @@ def total_variance(
 
 def free_errors(band: ErrorBand, is_centred: bool) -> FreeErrors:
     """Return the errors of a band; without the mean of each log if `is_centred`."""
-    _, source, count = np.unique(np.asarray(band.source).astype(str), return_inverse=True, return_counts=True)
+    _, source, count = np.unique(band.source.astype(str), return_inverse=True, return_counts=True)
     means = np.bincount(source, weights=band.tau_ext_smooth) / count
     error = band.tau_ext_smooth - means[source] * is_centred
     return FreeErrors(source, band.block, band.dq, error, band.tau_ext_std_filter, band.uncorrelated)

@@ -272,7 +272,6 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
         count += len(dq)
     if not squares:
         names = ", ".join(log.records[0].log for log in logs)
-        raise NotIdentifiable(
-            f"{joint}: its velocity in {names} is lost in noise; check the units and the clock of q and dq"
-        )
+        text = f"{joint}: its velocity in {names} is lost in noise"
+        raise NotIdentifiable(f"{text}; check the units and the clock of q and dq")
     return Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(squares / count))))

@@ -161,9 +161,8 @@ class LogModels:
 
     def joint_motion(self, joint: str, processing: tuple[float, float]) -> ArmMotion:
         """Return the motion of one joint, low-passed at a cutoff [Hz] and delayed by a lag [s]."""
-        if joint in self._motions and self._motions[joint][0] != processing:
-            del self._motions[joint]
-        if joint not in self._motions:
+        if joint not in self._motions or self._motions[joint][0] != processing:
+            self._motions.pop(joint, None)  # before the next one takes memory
             self._motions[joint] = processing, self._motion_at(self._records[joint], *processing)
         return self._motions[joint][1]
 
@@ -176,11 +175,9 @@ class LogModels:
         """Compute the effort (N,) of a joint by a fit."""
         model = self.identified.model(fit)
         key = *fit.key, self.identified.cutoff_and_lag(fit, joint)
-        tau_hat = self._efforts.get(key)
-        if tau_hat is None:
-            tau_hat = efforts(model, fit.theta, self.motion(fit, joint))
-            if fit.group == ARM:
-                self._efforts[key] = tau_hat
+        tau_hat = self._efforts[key] if key in self._efforts else efforts(model, fit.theta, self.motion(fit, joint))
+        if fit.group == ARM:
+            self._efforts[key] = tau_hat
         return np.ascontiguousarray(tau_hat[:, model.efforts.index(joint)])
 
     def dynamics(self, fit: Fit, joint: str) -> JointDynamics:

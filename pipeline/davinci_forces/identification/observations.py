@@ -64,10 +64,6 @@ class Observed(NamedTuple):
             **{name: getattr(self, name)[which] for name in ("still", "block", "period")},
         )
 
-    def process(self, processing: Sequence[Processing]) -> "Observed":
-        """Return the log with another processing for the effort of each joint."""
-        return self._replace(processing=tuple(processing))
-
     def motion(self, joint: int) -> ArmMotion:
         """Compute the motion of all joints, as the effort of a joint is modelled with; a long log's is not kept."""
         return joined_motion([motion_at(record, *self.processing[joint]) for record in self.records])
@@ -109,9 +105,7 @@ class Observed(NamedTuple):
     def _smooth_rows(
         self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoffs: Sequence[float], wanted: Booleans
     ) -> tuple[list[Array], Integers]:
-        """Phi (K, e, p) of some efforts, low-passed at each cutoff, at the wanted samples (N,) where it is known, and
-        these samples.
-        """
+        """Phi (K, e, p) of efforts, low-passed at each cutoff, at wanted samples (N,) where it is known, and these."""
         rate, indices = self.records[0].rate, []
         rows: list[list[Array]] = [[] for _ in cutoffs]
         for piece in pieces(model, motion, max(reach(rate, cutoff) for cutoff in cutoffs)):

@@ -80,16 +80,13 @@ class JointSearch:
         self._libraries: dict[tuple[Processing, tuple[Term, ...]], Library] = {}
         self._steps: dict[tuple[Processing, tuple[Term, ...]], Step | None] = {}
 
-    def model(self, terms: Sequence[Term]) -> CoupledArm | IndependentJoint:
-        """Return the model with these added terms."""
-        return joint_model(self.robot, self.joint, self.structure, terms)
-
     def library(self, processing: Processing, terms: tuple[Term, ...]) -> Library:
         """Return the equations of the model with these added terms."""
         key = processing, terms
         if key not in self._libraries:
-            logs = [log.process([processing] * len(log.records)) for log in self.logs]
-            self._libraries = {key: candidates.library(self.model(terms), logs, len(logs))}  # only the last is reused
+            logs = [log._replace(processing=(processing,) * len(log.records)) for log in self.logs]
+            model = joint_model(self.robot, self.joint, self.structure, terms)
+            self._libraries = {key: candidates.library(model, logs, len(logs))}  # only the last is reused
         return self._libraries[key]
 
     def step(
@@ -101,8 +98,8 @@ class JointSearch:
         """
         key = processing, terms
         if key not in self._steps:
-            equations, model = self.library(processing, among or terms), self.model(terms)
-            columns = equations.columns(model)
+            equations = self.library(processing, among or terms)
+            columns = equations.columns(joint_model(self.robot, self.joint, self.structure, terms))
             together = [equations.joints_moving[log.number] for log in self.logs]
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, together)
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
@@ -278,9 +275,9 @@ def shared_part(
     joints = [joint.name for joint in robot.joints]
     terms = {search.joint: search.chosen.terms for search in searches}
     processing = {search.joint: search.chosen.processing for search in searches}
-    by_joint = [processing.get(joint, arm[0].processing[0]) for joint in joints]
+    by_joint = tuple(processing.get(joint, arm[0].processing[0]) for joint in joints)
     model = coupled_joints(robot, [joints.index(search.joint) for search in searches], terms, CHOSEN)
-    equations = candidates.library(model, [log.process(by_joint) for log in arm], count)
+    equations = candidates.library(model, [log._replace(processing=by_joint) for log in arm], count)
     return CandidatePart(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
 
 
@@ -288,7 +285,8 @@ def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], 
     """Return the chosen model of a joint, with the equations of all its logs."""
     step = search.chosen
     model = joint_model(robot, search.joint, search.structure, step.terms)
-    equations = candidates.library(model, [log.process([step.processing] * len(log.records)) for log in logs], count)
+    processed = [log._replace(processing=(step.processing,) * len(log.records)) for log in logs]
+    equations = candidates.library(model, processed, count)
     ridge = Ridge(step.strength, np.ones(1), equations.combination)
     return CandidatePart(model, equations, equations.columns(model), ridge)
 

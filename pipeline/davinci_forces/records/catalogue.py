@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from davinci_forces.records import AnyRecord, Record
 
@@ -24,14 +25,11 @@ class Catalogue:
     """The records of a study by kind, each kind read at its first use."""
 
     def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
-        self._read = read
-        self._records: dict[type[Record], list[Record]] = {}
+        self._read = cache(read)
 
     def records(self, kind: type[AnyRecord]) -> list[AnyRecord]:
         """Return all records of a kind, in the order of the study's logs and the robot's joints."""
-        if kind not in self._records:
-            self._records[kind] = list(self._read(kind))
-        return list(self._records[kind])  # type: ignore[arg-type]
+        return list(self._read(kind))  # type: ignore[arg-type]
 
     def select(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
         """Return the records of a kind whose scalars have these values."""

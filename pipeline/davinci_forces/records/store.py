@@ -147,9 +147,8 @@ def _opened(kind: type[Record], whole: Path) -> Iterator[pq.ParquetFile]:
         with pq.ParquetFile(whole) as file:
             yield file
     except FileNotFoundError:
-        raise MissingRecord(
-            f"{whole} does not exist; run the stage that writes {kind.__name__} records first"
-        ) from None
+        advice = f"run the stage that writes {kind.__name__} records first"
+        raise MissingRecord(f"{whole} does not exist; {advice}") from None
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
         raise BadRecord(f"{whole}: not a {kind.__name__} record of this version ({error}); run with --force") from error
 

@@ -1,6 +1,4 @@
-"""The order of a run: a call about one log waits for the results of that log only, and a step that reads all logs
-waits for all of them.
-"""
+"""The order of a run: a call about a log waits for that log's results, a step that reads all logs for those of all."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache

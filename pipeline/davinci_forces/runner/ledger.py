@@ -117,9 +117,7 @@ class Ledger:
             yield from (entries[task] for task in sorted(entries))
 
     def write(self, entry: Entry) -> None:
-        """Record the outputs of a task, whose hashes are taken from the entry; remove its earlier outputs that no task
-        makes now.
-        """
+        """Record the outputs of a task, with their hashes; remove its earlier outputs that no task makes now."""
         before = self.entry(entry.stage, entry.task)
         self._outputs.update([*entry.outputs])
         removed = self._remove_outputs(before.outputs if before else ())

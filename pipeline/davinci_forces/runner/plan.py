@@ -45,9 +45,7 @@ class Places:
             self._names.get(kind.folder(), {}).get(log, {}).pop(path, None)
 
     def _changed_records(self, outputs: Iterable[str]) -> Iterator[tuple[type[Record], str, str, str]]:
-        """The records among a task's outputs, without those of logs that left the study; the order of their kinds
-        is computed again.
-        """
+        """The records among a task's outputs, of logs in the study; the order of their kinds is computed again."""
         for name in outputs:
             root, _, path = name.partition("/")
             kind = self._kinds.get(path.partition("/")[0]) if root == "processed" else None
@@ -145,27 +143,24 @@ class Plan:
         places = self.places()
         logs = (log,) if log else tuple(self._entries)
         if asks.each:
-            yield from self._each_record(asks, places, log)
+            [(parameter, kinds)] = asks.each.items()
+            for kind, place in places.find(kinds, log):
+                of_log, joint = log_and_joint(KINDS[kind], place)
+                others = {p: places.find(k, of_log, joint) for p, k in (asks.optional | asks.every).items()}
+                name = place.removesuffix(".parquet").partition("/")[2]
+                name = f"{KINDS[kind].folder()}/{name}" if len(kinds) > 1 else name
+                yield self._task(asks, name, {parameter: ((kind, place),), **others}, of_log, joint)
         elif asks.per_log:
             for name in logs:
-                of_log, others = ({p: places.find(k, name) for p, k in of.items()} for of in (asks.per_log, asks.every))
-                if any(of_log.values()):
-                    yield self._task(asks, name, of_log | others, name)
+                own, others = ({p: places.find(k, name) for p, k in of.items()} for of in (asks.per_log, asks.every))
+                if any(own.values()):
+                    yield self._task(asks, name, own | others, name)
         elif "log" in asks.given.values():
             yield from (self._task(asks, name, {}, name) for name in logs)
         else:
             records = {p: places.find(kinds, role=asks.roles.get(p, ANY)) for p, kinds in asks.every.items()}
             if any(records.values()) or not asks.reads:
                 yield self._task(asks, asks.name.rpartition(".")[2], records)
-
-    def _each_record(self, asks: Declaration, places: Places, of_log: str) -> Iterator[Task]:
-        [(parameter, kinds)] = asks.each.items()
-        for kind, place in places.find(kinds, of_log):
-            log, joint = log_and_joint(KINDS[kind], place)
-            others = {p: places.find(k, log, joint) for p, k in (asks.optional | asks.every).items()}
-            name = place.removesuffix(".parquet").partition("/")[2]
-            name = f"{KINDS[kind].folder()}/{name}" if len(kinds) > 1 else name
-            yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
 
     def _task(
         self, asks: Declaration, name: str, records: dict[str, tuple[Located, ...]], log: str = "", joint: str = ""

@@ -120,9 +120,7 @@ class Runner:
             leftover.unlink(missing_ok=True)
 
     def _remove_obsolete(self, steps: Sequence[str]) -> None:
-        """Remove the outputs of steps and kinds of record that no longer exist, and those that these steps made from
-        logs that have left the study.
-        """
+        """Remove the outputs of former steps and kinds of record, and those that these steps made from former logs."""
         folders = {kind.folder() for kind in KINDS.values()}
         all_steps = {*every_step(), REPORT}
         obsolete = [

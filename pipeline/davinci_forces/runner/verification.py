@@ -1,6 +1,4 @@
-"""Check that a study's files are unaltered, that nothing is left to run, that its records give its report, and that
-raw/ gives the same results again.
-"""
+"""Check that a study is unaltered and complete, that its records give its report, and raw/ the same results again."""
 
 import json
 import os
@@ -73,7 +71,10 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     Raises NotReproduced with all differences, one per line.
     """
     ledger = Ledger(folders)
-    recorded = known_files(ledger)
+    recorded: dict[str, dict[str, str]] = {}  # files that tasks read or made: for each hash, a task that did
+    for entry in ledger.entries():
+        for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
+            recorded.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
     problems = [f"{file} was altered: {reason}" for file, reason in ledger.invalid_files().items()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} has no results; run `davinci-forces all {folders.raw}` first")
@@ -92,22 +93,12 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     problems += [problem for name in compared for problem in altered_page(folders, name, contents[name])]
     actual_id = identity(contents[MANIFEST]) if contents else ""
     if report_id and actual_id != report_id:
-        problems.append(
-            f"the report ID of these files is {actual_id or 'unknown'}, not {report_id}: they are of another report"
-        )
+        what = f"the report ID of these files is {actual_id or 'unknown'}, not {report_id}"
+        problems.append(f"{what}: they are of another report")
     if problems:
         raise NotReproduced("\n".join(problems))
     count = Counter(name.partition("/")[0] for name in recorded if ledger.digest(name))
     return Verified(count["raw"], count["processed"], count["reports"], numbers, actual_id, tuple(unrelated))
-
-
-def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
-    """All files that tasks read or made: for each hash of a file, a task that read or made it."""
-    recorded: dict[str, dict[str, str]] = {}
-    for entry in ledger.entries():
-        for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
-            recorded.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
-    return recorded
 
 
 def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str, str]]) -> Iterator[str]:
@@ -125,9 +116,7 @@ def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str
 
 
 def unknown_files(folders: Folders, recorded: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Problems with links and unknown files among the results, and the unrelated files in raw/, which no
-    stage read.
-    """
+    """Problems with links and unknown files among the results, and the files in raw/ that no stage read."""
     paths = {*recorded, f"raw/{review.FILE}"}
     problems: list[str] = []
     unrelated: list[str] = []

@@ -67,9 +67,8 @@ def require_terms(terms: Terms, folders: Folders) -> None:
         expected = dict(terms.versions)
         versions = ", ".join(f"{name} {version} instead of {expected[name]}" for name, version in others)
         settings = " ".join(f"{name}={value}" for name, value in arithmetic.blas_variables().items())
-        raise BadRequest(
-            f"{here} has {versions}; numbers would differ: start it in the same environment, with {settings} set"
-        )
+        remedy = f"start it in the same environment, with {settings} set"
+        raise BadRequest(f"{here} has {versions}; numbers would differ: {remedy}")
 
 
 @contextmanager

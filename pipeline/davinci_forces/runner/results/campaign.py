@@ -100,7 +100,9 @@ Test = tuple[str, Place, int]  # kind of test, its series, and the number of the
 
 def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date: bool) -> Findings:
     """Drifts, variations and outliers beyond the standard errors, in series in which every value has one."""
-    time = times(studies, by_date)
+    time = {study.name: float(i) for i, study in enumerate(studies, 1)}
+    if by_date:  # [days since 1970]
+        time = {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
     slopes: dict[Place, Slope] = {}
     tests: dict[Test, float] = {}
     for row in series:
@@ -130,10 +132,3 @@ def limits_of(row: Series, odd: tuple[int, ...]) -> ControlLimits | None:
     if len(value) < drift.MIN_VALUES_TREND or not np.isfinite([value, std]).all():
         return None
     return ControlLimits(*drift.control_limits(value, std, IN_CONTROL))
-
-
-def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:
-    """The date of each study [days since 1970], or its number in order."""
-    if by_date:
-        return {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
-    return {study.name: float(i) for i, study in enumerate(studies, 1)}
