@@ -13,7 +13,7 @@ from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.records.record import LogJointRecord
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Number, literal
-from davinci_forces.report.results import Results, format_unit
+from davinci_forces.report.results import Results, format_unit, unit_of
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
@@ -57,16 +57,18 @@ class Context:
 
     def size(self, record: Record, field: str, value: float, digits: int = 2) -> str:
         """A value of a record's field with its unit, as text for a sentence."""
-        unit = record.origin.units.get(field, "") if record.origin else ""
-        return str(Number(value, format_unit(unit), digits=digits))
+        return str(Number(value, format_unit(unit_of(record, field)), digits=digits))
 
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter used; a chosen fit is named `chosen.<fit>`."""
-        chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
         setting = self.study.settings.fit
-        if setting == CHOSEN and chosen:
-            return chosen[0]
+        if setting == CHOSEN and (chosen := self.catalogue.select(Prediction, joint=joint, model=CHOSEN)):
+            return f"{CHOSEN}.{chosen[0].estimator}"
         return setting if self.fit_named(setting, joint) else self.own_fit(joint)
+
+    def shown_fit(self, joint: str) -> Fit | None:
+        """The fit that the filter used, or that of the joint by itself; None if there is neither."""
+        return self.used_record(joint) or self.fit_named(self.own_fit(joint), joint)
 
     def used_record(self, joint: str) -> Fit | None:
         """The fit that the filter used; None if it used the fit of a joint by itself and none was chosen."""
@@ -113,10 +115,6 @@ class Context:
         """The smoother's free space of a joint with the highest detection level, if possible of a log not fitted."""
         return max(self.spaces(joint), key=lambda space: space.detection_level, default=None)
 
-    def narrowest_space(self, joint: str) -> FreeSpace | None:
-        """The smoother's free space of a joint with the lowest coverage, if possible of a log not fitted."""
-        return min(self.spaces(joint), key=lambda space: space.coverage, default=None)
-
     def spaces(self, joint: str) -> list[FreeSpace]:
         """The smoother's free space of a joint in each log that was not fitted, else in each fitted one."""
         spaces = self.catalogue.select(FreeSpace, joint=joint, filter=SMOOTHER)
@@ -160,6 +158,5 @@ def name_in_sentence(joint: str) -> str:
 
 def label(record: Record, field: str, meaning: str = "") -> str:
     """The label of an axis: what a field means and its unit."""
-    unit = record.origin.units.get(field, "") if record.origin else ""
-    text = meaning or QUANTITIES[field].meaning
-    return f"{text} [{format_unit(unit)}]" if unit not in ("", "1") else text
+    text, unit = meaning or QUANTITIES[field].meaning, format_unit(unit_of(record, field))
+    return f"{text} [{unit}]" if unit else text

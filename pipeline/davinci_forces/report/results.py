@@ -110,11 +110,15 @@ def collect(catalogue: Catalogue) -> Results:
 
 def cell(record: Record, field: str, row: int | None) -> tuple[float, str]:
     """A scalar of a record, or one row of a column, with its unit; a row may have a unit of its own."""
-    value = getattr(record, field)
-    unit = record.origin.units.get(field, "") if record.origin else ""
+    value, unit = getattr(record, field), unit_of(record, field)
     if row is None:
         return float(value), unit
     return float(value[row]), str(record.unit[row]) if unit == PER_ROW else unit  # type: ignore[attr-defined]
+
+
+def unit_of(record: Record, field: str) -> str:
+    """The unit of a record's field, "" if the record was not read from a file."""
+    return record.origin.units.get(field, "") if record.origin else ""
 
 
 def format_unit(unit: str) -> str:

@@ -97,7 +97,7 @@ def effects(context: Context) -> Iterator[Table]:
 
 def used_parameters(context: Context, joint: str) -> dict[str, str]:
     """The parameters of a joint in the fit that the filter used, by name, with the keys of their values."""
-    fit = context.used_record(joint) or context.fit_named(context.own_fit(joint), joint)
+    fit = context.shown_fit(joint)
     rows = of_joint(fit, joint) if fit else {}
     return {name: ".".join(("fit", *fit.key, slug(fit.parameter[i]))) for i, name in rows.items() if fit}
 
@@ -128,7 +128,7 @@ def effort_figure(track: Track, pushes: list[Push]) -> Figure:
     """The effort exerted on a joint, and the smoother's estimate of it."""
     effort = label(track, "tau_ext", "external effort")
     panel = compared_panel("External effort", effort, track.t, track.tau_ext_smooth, pushes)
-    return compared_figure(f"{run_name(track.log, track.joint)}: external effort", (panel,))
+    return compared_figure(f"{run_name(track)}: external effort", (panel,))
 
 
 def force_figure(force: TipForce, pushes: list[Push]) -> Figure:

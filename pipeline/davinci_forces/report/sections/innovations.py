@@ -44,7 +44,7 @@ def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     figures = [figure(context, e) for e in drawn]
     yield from parts.first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
-    causes = tuple(OnScreen(parts.run_name(e.log, e.joint), f"why-{e.log}-{e.joint}", (trials(e),)) for e in explained)
+    causes = tuple(OnScreen(parts.run_name(e), f"why-{e.log}-{e.joint}", (trials(e),)) for e in explained)
     yield OnScreen(f"The tested causes in {count(len(causes), 'run')}", "innovation-runs", causes)
 
 
@@ -100,7 +100,7 @@ def trials(e: Explanation) -> Table:
         p, explains = f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001", "●" if e.explains[i] else ""
         rows.append((literal(str(e.without[i])), str(e.left[i]), f"{e.walk[i]:.3g}", p, explains))
     caption = (
-        f"{parts.run_name(e.log, e.joint)}: the removed cause, the number of tested samples, the random walk over "
+        f"{parts.run_name(e)}: the removed cause, the number of tested samples, the random walk over "
         "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
     )
     header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
@@ -114,7 +114,7 @@ def least_probability(e: Explanation) -> Column:
 
 def figure(context: Context, e: Explanation) -> Figure:
     """Innovations over time, autocorrelation, cumulative periodogram, correlation with the motion.  Fig 7.9-7.11"""
-    name, about = parts.run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
+    name, about = parts.run_name(e), {"log": e.log, "joint": e.joint}
     white = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.select(Innovation, **about)}
     tested = [(white[field], of) for field, of in INNOVATION_FIELDS if field in white]

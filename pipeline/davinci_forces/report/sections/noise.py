@@ -39,7 +39,7 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     for average in averages:
         yield from outliers(context, average)
     folded = tuple(
-        OnScreen(run_name(a.log, a.joint), f"noise-{a.log}-{a.joint}", figures)
+        OnScreen(run_name(a), f"noise-{a.log}-{a.joint}", figures)
         for a in averages
         if (figures := tuple(average_figures(context, a)))
     )
@@ -76,7 +76,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
             noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MAX_PERIOD_NOISE * np.median(rms)]
             if noisy:
                 times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in noisy[:5])
-                name = f"**{run_name(average.log, average.joint)}**"
+                name = f"**{run_name(average)}**"
                 which = f"period{'' if len(noisy) == 1 else 's'} {', '.join(map(str, noisy[:5]))} of {len(rms)}"
                 message = f"{name}: {meaning} noise of {which} is {times} times that of the median period."
                 start = " The arm may not yet have settled: set `skip`." if noisy[0] == 1 else ""
@@ -99,7 +99,7 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
     if not (period_residuals and trajectories and spectra and signals):
         return
     whiteness = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
-    name = run_name(average.log, average.joint)
+    name = run_name(average)
     yield Figure(
         f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
         "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "

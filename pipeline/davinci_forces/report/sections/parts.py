@@ -1,7 +1,7 @@
 """Parts that several sections share: tables on paper or on screen, marks of a run, and words."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
 from typing import Any
 
@@ -51,10 +51,10 @@ def hand_name(context: Context, hand: str) -> str:
     return "default" if hand == "thesis" and not context.compares_with_thesis else literal(hand)
 
 
-def paper_or_screen(table: Table, name: str = "", most: int = PAPER) -> Iterator[Block]:
-    """A table on paper, or on screen if it has more rows than `most`, under a name or the start of its caption."""
+def paper_or_screen(table: Table, name: str = "") -> Iterator[Block]:
+    """A table on paper, or on screen if it has more rows than `PAPER`, under a name or the start of its caption."""
     name = name or re.split(r"[;:.?](?: |$)", table.caption)[0]
-    yield OnScreen(name, f"all-{table.label}", (table,)) if len(table.rows) > most else table
+    yield OnScreen(name, f"all-{table.label}", (table,)) if len(table.rows) > PAPER else table
 
 
 def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int = 1) -> Iterator[Block]:
@@ -72,8 +72,8 @@ def grade_of_mass(context: Context, weight: Weight) -> tuple[Level, str]:
 def trust(context: Context, joint: str) -> Trust:
     """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
     run, about = decisive(scored_predictions(context, joint), context.catalogue.select(PathShare, joint=joint))
-    worst, narrowest = context.worst_space(joint), context.narrowest_space(joint)
-    return Trust(joint, run, worst, context.study.settings.effort.get(joint), about, narrowest)
+    narrowest = min(context.spaces(joint), key=lambda space: space.coverage, default=None)
+    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about, narrowest)
 
 
 def scored_predictions(context: Context, joint: str) -> list[Prediction]:
@@ -83,9 +83,9 @@ def scored_predictions(context: Context, joint: str) -> list[Prediction]:
     return [p for p in scored if p.role != "contact" or context.study.log(p.log).has_known_free_motion]
 
 
-def run_name(log: str, joint: str) -> str:
-    """A joint in a log, as the beginning of a caption."""
-    return f"{title(joint)} in {literal(log)}"
+def run_name(run: Any) -> str:
+    """The joint and the log of a record, as the beginning of a caption."""
+    return f"{title(run.joint)} in {literal(run.log)}"
 
 
 def is_of_link(phi: str) -> bool:
@@ -93,21 +93,19 @@ def is_of_link(phi: str) -> bool:
     return str(phi).startswith("partial")
 
 
-def contact_spans(context: Context, log: str, name: str) -> tuple[VSpan, ...]:
-    """The windows of contact that the study states of a log, the first named in the legend."""
-    windows = context.study.log(log).contact
-    return tuple(VSpan(start, end, "" if i else name) for i, (start, end) in enumerate(windows))
-
-
 def converged_rows(t: Column) -> slice:
     """The samples after the first second, of a short log a fifth: the filter's wide band before would hide them."""
     return slice(int(np.searchsorted(t, t[0] + min(1.0, 0.2 * (t[-1] - t[0])))), None)
 
 
+def spans(windows: Iterable[tuple[float, float]], name: str = "", colour: Colour = "orange") -> tuple[VSpan, ...]:
+    """Ranges of time, the first named in the legend."""
+    return tuple(VSpan(start, end, "" if i else name, colour) for i, (start, end) in enumerate(windows))
+
+
 def spans_where(t: Column, which: Booleans, name: str, colour: Colour = "orange") -> tuple[VSpan, ...]:
     """The ranges of time in which a condition (N,) holds, the first named in the legend."""
-    ends = [(float(t[part.start]), float(t[part.stop - 1])) for part in runs(which)]
-    return tuple(VSpan(start, end, "" if i else name, colour) for i, (start, end) in enumerate(ends))
+    return spans(((float(t[part.start]), float(t[part.stop - 1])) for part in runs(which)), name, colour)
 
 
 def effort_panel(record: Track | Prediction | Residual, *spans: VSpan, heading: str = "Effort") -> Panel:

@@ -91,7 +91,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
-    name, windows = parts.run_name(p.log, p.joint), parts.contact_spans(context, p.log, "contact")
+    name, windows = parts.run_name(p), parts.spans(context.study.log(p.log).contact, "contact")
     error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
     return Figure(
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "

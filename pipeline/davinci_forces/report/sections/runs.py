@@ -34,7 +34,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
         "External efforts are those of its smoother, which uses the whole recording and has no delay."
         + (tested if context.catalogue.records(Explanation) else "")
     )
-    if at_rest := [parts.run_name(t.log, t.joint) for t in tracks if t.at_rest]:
+    if at_rest := [parts.run_name(t) for t in tracks if t.at_rest]:
         yield Prose(
             f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
             "to its static level, and hides external efforts up to that level."
@@ -47,8 +47,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     others = [t for t in tracks if t not in worst and not t.at_rest]
     if others:
         folded = tuple(
-            OnScreen(parts.run_name(t.log, t.joint), f"track-{t.log}-{t.joint}", (trace(context, t, ""),))
-            for t in others
+            OnScreen(parts.run_name(t), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others
         )
         yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
 
@@ -78,7 +77,7 @@ def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
 
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
-    name, windows = parts.run_name(t.log, t.joint), parts.contact_spans(context, t.log, "stated contact")
+    name, windows = parts.run_name(t), parts.spans(context.study.log(t.log).contact, "stated contact")
     largest = float(abs(t.tau_ext_smooth[parts.converged_rows(t.t)]).max(initial=0.0))
     return Figure(
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "

@@ -10,10 +10,10 @@ from davinci_forces.records import Column, TipBudget, TipContact, TipForce
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
-from davinci_forces.report.content.marks import AnyMark, Band, Colour, Line, Line3D, Points3D, VSpan
+from davinci_forces.report.content.marks import AnyMark, Band, Colour, Line, Line3D, Points3D
 from davinci_forces.report.content.number import MINUS, Number
 from davinci_forces.report.context import Context, label, name_in_sentence
-from davinci_forces.report.sections.parts import converged_rows, section_of, strokes
+from davinci_forces.report.sections.parts import converged_rows, section_of, spans, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 F = ("f_x", "f_y", "f_z")
@@ -142,9 +142,9 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
     """One component over time."""
     shown = converged_rows(force.t)
     t, f, std = force.t[shown], getattr(force, f"f_{axis}")[shown], np.sqrt(getattr(force, f"c_{axis}{axis}")[shown])
-    spans = [] if contact is None else [VSpan(*window) for window in windows(contact)]
+    windows = [] if contact is None else list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))
     marks: tuple[AnyMark, ...] = (
-        *spans,
+        *spans(windows),
         Band(t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
         Line(t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
@@ -181,8 +181,3 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
 def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line3D:
     """A line through points (N, 3)."""
     return Line3D(points[:, 0], points[:, 1], points[:, 2], name, colour, "solid", arrow)
-
-
-def windows(contact: TipContact) -> list[tuple[float, float]]:
-    """The start and the end [s] of each contact."""
-    return list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))

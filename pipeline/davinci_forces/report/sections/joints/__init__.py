@@ -58,7 +58,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
         if i == 0:
             yield from shown
         else:
-            yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
+            yield OnScreen(run_name(residual), f"residual-{residual.log}-{residual.joint}", shown)
     yield from unidentified_parameters(context, joint, used is plain)
     yield from implausible([used] if used is not plain else fits, joint)
     yield comparison(context, fits)

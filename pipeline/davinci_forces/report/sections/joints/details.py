@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Fit, FrictionMap, Identifiability, Residual, SwarmSearch
-from davinci_forces.report.content import Block, Figure, Panel, Prose, literal
+from davinci_forces.report.content import Block, Figure, Panel, Prose
 from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
 from davinci_forces.report.context import Context, estimator_name, label, name_in_sentence, title
+from davinci_forces.report.sections.parts import run_name
 
 LOOKS: dict[str, Colour] = {
     "lse": "vermillion", "wlse": "blue", "pso": "green", "consistent": "purple", "tls": "orange",
@@ -34,8 +35,7 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     if not others:
         return
     effort = label(plain, "tau", "effort")
-    name = f"{title(fit.group)} in {literal(plain.log)}"
-    named = ", ".join(map(estimator_name, residuals))
+    name, named = run_name(plain), ", ".join(map(estimator_name, residuals))
     largest, verb = max(apart[name] for name in others), "is" if len(same) == 1 else "are"
     alike = f" {' and '.join(map(estimator_name, same))} {verb} the same as least squares." if same else ""
     models = (Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items())

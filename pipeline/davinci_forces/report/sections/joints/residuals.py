@@ -25,7 +25,7 @@ ALL_TRIED = "No term that was tried for the choice of the model removes this."
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     """The residual of a fit in one log: over time, against the motion, and its autocorrelation."""
-    name, place = run_name(residual.log, residual.joint), f"{residual.log}-{residual.joint}"
+    name, place = run_name(residual), f"{residual.log}-{residual.joint}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
     moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)

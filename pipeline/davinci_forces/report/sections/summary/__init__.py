@@ -11,7 +11,8 @@ from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import converged_rows, scored_predictions, section_of, spans_where, trust
+from davinci_forces.report.results import unit_of
+from davinci_forces.report.sections import parts
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
 from davinci_forces.report.verdicts import Trust, band_in_words, percent
@@ -24,12 +25,12 @@ MAX_IN_COLUMN = 3  # panels below each other on page one
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
-@section_of("The answer", "summary")
+@parts.section_of("The answer", "summary")
 def section(context: Context) -> Iterator[Block]:
     """The answer on one page."""
     for task, failed in context.provenance.failures.items():
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
-    trusts = [trust(context, joint) for joint in fitted_joints(context)]
+    trusts = [parts.trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
     if lines := opening.measurements(context):
@@ -168,22 +169,22 @@ def efforts_in_words(context: Context) -> str:
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
     contacts = context.catalogue.select(Contact, joint=trusted.joint)
-    errors = {p.log: p.model_error for p in scored_predictions(context, trusted.joint)}
+    errors = {p.log: p.model_error for p in parts.scored_predictions(context, trusted.joint)}
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
     by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
     logs = [log for log in by_error if len(touched[log]) == 1] or by_error
     logs = logs or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
-        spans = [VSpan(start, end, "", TOUCHED) for start, end in context.study.log(track.log).contact]
-        levels = [trusted.space.free_level] if trusted.space is not None else []
-        level = [HBand(-size, size, "free space: level of 95 % of samples") for size in levels]
-        shown = converged_rows(track.t)
+        stated = parts.spans(context.study.log(track.log).contact, colour=TOUCHED)
+        sizes = [trusted.space.free_level] if trusted.space is not None else []
+        level = [HBand(-size, size, "free space: level of 95 % of samples") for size in sizes]
+        shown = parts.converged_rows(track.t)
         line = Line(track.t[shown], track.tau_ext_smooth[shown], "external effort", "vermillion")
-        still = spans_where(track.t, track.standing > 0, "at rest: not judged", REST)
+        still = parts.spans_where(track.t, track.standing > 0, "at rest: not judged", REST)
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
-        yield Panel(heading, "time [s]", effort, (*spans, *still, *level, line, *peaks))
+        yield Panel(heading, "time [s]", effort, (*stated, *still, *level, line, *peaks))
 
 
 def in_column(panels: list[Panel]) -> Iterator[Panel]:
@@ -212,8 +213,8 @@ def named_peaks(track: Track, contact: Contact) -> Points:
 
 def spoken(contact: Contact) -> str:
     """The peaks of a log in words, for those who cannot see the figure."""
-    unit = contact.origin.units["peak"] if contact.origin else ""
-    return f"{contact.joint.replace('_', ' ')} peaks at {', '.join(f'{p:+.3g}' for p in contact.peak)} {unit}"
+    peaks = ", ".join(f"{p:+.3g}" for p in contact.peak)
+    return f"{contact.joint.replace('_', ' ')} peaks at {peaks} {unit_of(contact, 'peak')}"
 
 
 def trust_table(context: Context, trusts: list[Trust]) -> Table:

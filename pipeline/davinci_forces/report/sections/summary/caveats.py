@@ -124,7 +124,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
 
 def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, str]]:
     """Yield a caveat if the model in use has parameters that no mechanism has."""
-    fit = context.used_record(joint) or context.fit_named(context.own_fit(joint), joint)
+    fit = context.shown_fit(joint)
     if fit is None:
         return
     impossible = [verdicts.is_impossible(*of) for of in zip(fit.theta, fit.theta_std, strict=True)]
