@@ -25,6 +25,7 @@ __all__ = [
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
 Part = TypeVar("Part", bound=Any)
+PAGE_WIDTH = 170.0  # [mm] of the text on an A4 page
 MAX_POINTS_OF_MARK = 1 << 16  # several times what a page shows, so that thinning again hides nothing
 
 
@@ -118,7 +119,7 @@ class Panel:
 class Figure:
     """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
 
-    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.
+    `height` is that of one row of panels [mm], on a page whose text is `PAGE_WIDTH` wide.
     """
 
     caption: str

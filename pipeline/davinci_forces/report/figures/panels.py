@@ -3,22 +3,22 @@
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content import Figure, Panel
+from davinci_forces.report.content import PAGE_WIDTH, Figure, Panel
 from davinci_forces.report.content.marks import AnyMark, Bars, Histogram, Line, Line3D, Points, Points3D, Stems, Tiles
 from davinci_forces.report.content.thinning import is_sorted, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
+from davinci_forces.report.figures.shapes import LINE_HEIGHT
 from davinci_forces.report.figures.ticks import Axis, axis_over
 
-PAGE_WIDTH = 170.0  # [mm] of the text on an A4 page
 # Of one mark in a millimetre: finer than its lines and symbols are wide.
 VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = 6, 30, 3
 LETTER_WIDTH = 1.65  # [mm] width of a character of a label
-LINE_HEIGHT = 3.9  # [mm] height of a line of a label or a row of a legend
 SAMPLE = 12.0  # [mm] width of the sample before a legend entry, with the gaps around it
 NAME = 3.6  # [mm] height of a point's name beside the point
 ABOUT = 18.0  # [mm] of a panel's height for the words above and below the axes
@@ -34,25 +34,28 @@ NARROW, X_STEPS, FEW_X_STEPS, Y_STEPS = 70.0, 8, 4, 5  # [mm] a narrow panel; la
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a panel: its title in lines, and the entries of its legend, so many side by side.
+    """What stands above a panel: its title in lines, and each entry of its legend, with its place.
 
-    A legend of one row stands `beside` the title if both fit.  One that holds for all panels of a row goes `across`
-    them, above their titles.
+    A legend of one row stands beside the last line of the title if both fit.  One that holds for all panels of a row
+    goes `across` them, above their titles.
     """
 
     title: str
-    entries: tuple[str, ...]
-    columns: int
-    beside: bool
+    entries: tuple[
+        tuple[str, float, int], ...
+    ]  # text, distance from the left [mm], lines below the first of the legend
+    legend_lines: int
     across: bool = False
+
+    @property
+    def title_lines(self) -> int:
+        """Lines of the title."""
+        return lines_of(self.title) if self.title else 0
 
     @property
     def height(self) -> float:
         """Height of the whole heading [mm]."""
-        # Entries that stand side by side have one line each.
-        rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(lines_of, self.entries))
-        lines = rows * (not self.beside) + (lines_of(self.title) if self.title else 0)
-        return LINE_HEIGHT * lines + 1.5
+        return LINE_HEIGHT * (self.legend_lines + self.title_lines) + 1.5
 
 
 @dataclass(frozen=True)
@@ -77,14 +80,19 @@ class PlacedPanel:
 
 def plan_heading(title: str, marks: Sequence[AnyMark | Line3D | Points3D], room: float) -> Heading:
     """The heading of axes of this width [mm]."""
-    labels = tuple(mark.label for mark in marks if mark.label)
-    longest = max(map(len, labels), default=0)
-    columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER_WIDTH * longest))))
-    entries = tuple(_wrap(label, room - SAMPLE) for label in labels)
+    labels = [mark.label for mark in marks if mark.label]
+    widths = [SAMPLE + LETTER_WIDTH * len(label) for label in labels]
+    columns = max(1, min(len(labels), int(room / max(widths, default=SAMPLE))))
+    texts = [_wrap(label, room - SAMPLE) for label in labels]
     title = _wrap(title, 0.9 * room)  # bold letters are wider
-    row = sum(SAMPLE + LETTER_WIDTH * len(label) for label in labels) + 3
-    beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER_WIDTH * len(title) + row <= room
-    return Heading(title, entries, columns, beside)
+    if title and columns == len(labels) and 1.2 * LETTER_WIDTH * len(title) + sum(widths) + 3 <= room:
+        starts = accumulate(widths, initial=room - sum(widths))
+        return Heading(title, tuple((text, x, -1) for text, x in zip(texts, starts, strict=False)), 0)
+    # Entries that stand side by side have one line each.
+    heights = [lines_of(text) if columns == 1 else int(k % columns == 0) for k, text in enumerate(texts)]
+    rows = [sum(heights[: k - k % columns]) for k in range(len(texts))]
+    entries = ((text, k % columns * max(widths), row) for k, (text, row) in enumerate(zip(texts, rows, strict=True)))
+    return Heading(title, tuple(entries), sum(heights))
 
 
 def lines_of(text: str) -> int:

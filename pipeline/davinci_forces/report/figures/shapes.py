@@ -8,6 +8,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, runs
 
 POINT = 72 / 25.4  # points in a millimetre
+LINE_HEIGHT = 3.9  # [mm] height of a line of a label or a row of a legend
 LONG = 200  # points of a path whose steps are in tenths of a point, not hundredths
 FAR = 5000.0  # [pt] beyond every page
 WORDS_FONT = "DejaVu Sans"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content import Figure3D
+from davinci_forces.report.content import PAGE_WIDTH, Figure3D
 from davinci_forces.report.content.marks import Line3D, Points3D
 from davinci_forces.report.figures.draw import dots, stroke
 from davinci_forces.report.figures.palette import AXES, COLOURS, GRID, WORDS
@@ -49,20 +49,20 @@ class View(NamedTuple):
         return self.centre[0] + right, self.centre[1] - up
 
 
-def view_of(figure: Figure3D, width: float, height: float, top: float) -> View:
-    """The view of a figure in a place of this width and height [pt] below `top`."""
+def view_of(figure: Figure3D, top: float) -> View:
+    """The view of a figure in its place below `top` [mm]."""
     points = np.hstack([[mark.x, mark.y, mark.z] for mark in figure.marks])
     least, greatest = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
     half = AROUND / 2 * max(float(np.max(greatest - least)), 1e-9)
     right, up = np.abs(SCREEN).sum(axis=1)  # of the farthest corners
-    high = height - LABEL_GAP - NORMAL_SIZE  # without the labels of the lower edges
+    width, high = PAGE_WIDTH * POINT, (figure.height - top) * POINT - LABEL_GAP - NORMAL_SIZE  # above the lower labels
     scale = min((width / 2 - 2 * LABEL_GAP) / right, high / 2 / up)
-    return View((least + greatest) / 2, half, (width / 2, top + high / 2), float(scale))
+    return View((least + greatest) / 2, half, (width / 2, top * POINT + high / 2), float(scale))
 
 
-def draw_space(figure: Figure3D, marks: tuple[Line3D | Points3D, ...], width: float, top: float) -> str:
-    """Cube and marks of a figure that is `width` wide, below `top` [mm]."""
-    view = view_of(figure, width * POINT, (figure.height - top) * POINT, top * POINT)
+def draw_space(figure: Figure3D, marks: tuple[Line3D | Points3D, ...], top: float) -> str:
+    """Cube and marks of a figure, below `top` [mm]."""
+    view = view_of(figure, top)
     return "".join(draw_axis(view, axis) for axis in range(3)) + "".join(
         draw_line(mark, view) if isinstance(mark, Line3D) else draw_points(mark, view) for mark in marks
     )

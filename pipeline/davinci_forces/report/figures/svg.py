@@ -2,24 +2,12 @@
 
 from weakref import WeakKeyDictionary
 
-from davinci_forces.report.content import Figure, Figure3D
+from davinci_forces.report.content import PAGE_WIDTH, Figure, Figure3D
 from davinci_forces.report.content.marks import AnyMark, Bars, Line3D, Points3D, Tiles
 from davinci_forces.report.figures.draw import Frame, draw_bars, draw_mark, draw_sample, stroke
 from davinci_forces.report.figures.palette import AXES, GRID, WORDS, assign_looks
-from davinci_forces.report.figures.panels import (
-    LETTER_WIDTH,
-    LINE_HEIGHT,
-    NUMBERS,
-    PAGE_WIDTH,
-    SAMPLE,
-    TICK,
-    Heading,
-    PlacedPanel,
-    lines_of,
-    place_panels,
-    plan_heading,
-)
-from davinci_forces.report.figures.shapes import NORMAL_SIZE, POINT, SMALL_SIZE, TITLE_SIZE, path, words
+from davinci_forces.report.figures.panels import NUMBERS, TICK, Heading, PlacedPanel, place_panels, plan_heading
+from davinci_forces.report.figures.shapes import LINE_HEIGHT, NORMAL_SIZE, POINT, SMALL_SIZE, TITLE_SIZE, path, words
 from davinci_forces.report.figures.space import draw_space
 from davinci_forces.report.figures.ticks import Axis
 
@@ -36,8 +24,8 @@ def svg(figure: Figure | Figure3D) -> str:
     if isinstance(figure, Figure3D):
         marks = tuple(assign_looks(figure.marks))
         heading, height = plan_heading("", marks, PAGE_WIDTH), figure.height
-        content = draw_space(figure, marks, PAGE_WIDTH, heading.height)
-        content += draw_heading(heading, marks, 0.0, heading.height, PAGE_WIDTH)
+        content = draw_space(figure, marks, heading.height)
+        content += draw_heading(heading, marks, 0.0, heading.height)
     else:
         panels, height = place_panels(figure)
         content = "".join(draw_panel(panel, f"p{i}") for i, panel in enumerate(panels))
@@ -61,7 +49,7 @@ def draw_panel(panel: PlacedPanel, name: str) -> str:
     clip = f'<defs><clipPath id="{name}">{box}</clipPath></defs>'
     return (
         f'{clip}{draw_grid(panel, frame)}<g clip-path="url(#{name})">{marks}</g>{draw_axes(panel, frame)}'
-        f"{draw_heading(panel.heading, panel.marks, panel.left, panel.top, panel.width)}"
+        f"{draw_heading(panel.heading, panel.marks, panel.left, panel.top)}"
     )
 
 
@@ -114,22 +102,14 @@ def lines(
     )
 
 
-def draw_heading(
-    heading: Heading, marks: tuple[AnyMark | Line3D | Points3D, ...], left: float, bottom: float, width: float
-) -> str:
-    """Title and legend above axes whose upper left corner is at (left, bottom) and which are `width` wide [mm]."""
-    top, title_lines = bottom - heading.height + LINE_HEIGHT / 2 + 0.5, lines_of(heading.title) * bool(heading.title)
-    shown = [mark for mark in marks if mark.label]
-    widths = [SAMPLE + LETTER_WIDTH * len(mark.label) for mark in shown]
-    x, y = left, top + LINE_HEIGHT * title_lines * (not heading.across)
-    if heading.beside:
-        x, y = left + width - sum(widths), y - LINE_HEIGHT
-    svg, start = "", x
-    for k, (mark, entry) in enumerate(zip(shown, heading.entries, strict=True)):
-        svg += draw_sample(mark, x * POINT, y * POINT, DRAWN_SAMPLE * POINT)
-        svg += lines((x + DRAWN_SAMPLE + 1.5) * POINT, y * POINT, entry, NORMAL_SIZE, anchor="start")
-        x += widths[k] if heading.beside else max(widths)
-        if not heading.beside and (k + 1) % heading.columns == 0:
-            x, y = start, y + LINE_HEIGHT * (lines_of(entry) if heading.columns == 1 else 1)
-    top = bottom - 1.0 - LINE_HEIGHT * (title_lines - 0.5) if heading.across else top
-    return svg + lines(left * POINT, top * POINT, heading.title, TITLE_SIZE, anchor="start", bold=True)
+def draw_heading(heading: Heading, marks: tuple[AnyMark | Line3D | Points3D, ...], left: float, bottom: float) -> str:
+    """Title and legend above axes whose upper left corner is at (left, bottom) [mm]."""
+    first, title_height = bottom - heading.height + LINE_HEIGHT / 2 + 0.5, LINE_HEIGHT * heading.title_lines
+    legend = first if heading.across else first + title_height
+    svg = ""
+    for mark, (text, x, row) in zip((mark for mark in marks if mark.label), heading.entries, strict=True):
+        start, y = (left + x) * POINT, (legend + LINE_HEIGHT * row) * POINT
+        svg += draw_sample(mark, start, y, DRAWN_SAMPLE * POINT)
+        svg += lines(start + (DRAWN_SAMPLE + 1.5) * POINT, y, text, NORMAL_SIZE, anchor="start")
+    title = bottom - 1.0 - title_height + LINE_HEIGHT / 2 if heading.across else first
+    return svg + lines(left * POINT, title * POINT, heading.title, TITLE_SIZE, anchor="start", bold=True)
