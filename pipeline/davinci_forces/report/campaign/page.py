@@ -103,16 +103,14 @@ def joint_section(
     changed = sorted({series.name for series in of_joint if findings.has_change(series)})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
-    figure = Figure(
+    caption = (
         f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. The line is "
         f"the weighted mean. Grey: control limits, which {100 * findings.inside:.1f} % of further values in control "
-        "keep. Studies that stand out are named.",
-        f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}.",
-        tuple(panel(series, findings) for series in drawn),
-        f"campaign-{label}",
-        columns=2,
-        height=34,
+        "keep. Studies that stand out are named."
     )
+    alt = f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}."
+    panels = tuple(panel(series, findings) for series in drawn)
+    figure = Figure(caption, alt, panels, f"campaign-{label}", columns=2, height=34)
     floors = [name for name in names if name in FLOORS.values()]
     parameters = [name for name in names if name not in floors]
     tables = (

@@ -101,11 +101,10 @@ def figure(choice: Choice) -> Figure:
     )
     finite = np.isfinite(choice.over_periods)
     repeated = (Points(size[finite], choice.over_periods[finite], "periods left out", "green"),) if finite.any() else ()
-    return Figure(
+    caption = (
         "Relative error of every candidate over its number of parameters, on fitted data and on data that were left "
-        "out.",
-        "Relative error over number of parameters: falling on fitted data, but not always on data left out.",
-        (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),),
-        label="choice-figure",
-        height=46,
+        "out."
     )
+    alt = "Relative error over number of parameters: falling on fitted data, but not always on data left out."
+    panels = (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),)
+    return Figure(caption, alt, panels, label="choice-figure", height=46)

@@ -71,13 +71,9 @@ def response(context: Context, study: ControlStudy) -> Figure:
         early = lyapunov.t < until
         line = (Line(lyapunov.t[early], lyapunov.V[early], "", "black"), HLine(0.0))
         panels.append(Panel("Lyapunov function", "time [s]", label(lyapunov, "V"), line))
-    return Figure(
-        f"Simulated: {study.title}.",
-        f"Positions and velocities over time, and the Lyapunov function falling to zero: {study.title}.",
-        tuple(panels),
-        columns=3,
-        height=52,
-    )
+    caption = f"Simulated: {study.title}."
+    alt = f"Positions and velocities over time, and the Lyapunov function falling to zero: {study.title}."
+    return Figure(caption, alt, tuple(panels), columns=3, height=52)
 
 
 def table(context: Context, studies: list[ControlStudy], caption: str, columns: dict[str, str]) -> Table:

@@ -59,10 +59,8 @@ def figure(context: Context, trajectories: list[Excitation]) -> Figure:
         lines = [Line(e.t, getattr(e, symbol), source_label(e) if named else "") for e in trajectories]
         bounds = [HLine(bound, "limits" if named and i == 0 else "") for i, bound in enumerate(getattr(limits, symbol))]
         panels.append(Panel(meaning.capitalize(), "time [s]", label(first, symbol, meaning), (*lines, *bounds)))
-    return Figure(
-        f"{title(first.joint)}: one period of the published trajectories and of the designed one, with the limits.",
-        f"Position, velocity and acceleration over a period of the {title(first.joint)} trajectories.",
-        tuple(panels),
-        columns=3,
-        height=55,
+    caption = (
+        f"{title(first.joint)}: one period of the published trajectories and of the designed one, with the limits."
     )
+    alt = f"Position, velocity and acceleration over a period of the {title(first.joint)} trajectories."
+    return Figure(caption, alt, tuple(panels), columns=3, height=55)

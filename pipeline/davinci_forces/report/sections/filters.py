@@ -137,11 +137,9 @@ def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     for n in noises:
         marks = Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)
         panels.append(Panel(title(n.joint), "delay [s]", label(n, "trial_std", "noise"), marks, x_log=True))
-    return Figure(
+    caption = (
         "Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown that "
-        f"late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it.",
-        f"Noise of the filter over its delay for {count(len(noises), 'joint')}.",
-        tuple(panels),
-        "noise-over-delay",
-        height=35,
+        f"late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
     )
+    alt = f"Noise of the filter over its delay for {count(len(noises), 'joint')}."
+    return Figure(caption, alt, tuple(panels), "noise-over-delay", height=35)

@@ -84,15 +84,12 @@ def effects(context: Context) -> Iterator[Table]:
     if rows:
         rows.append(("Motors", "rotor inertia", "see truth.toml", "part of the inertia", "–"))
         rows.append(("Motors", "windings, limits of current and voltage", "see truth.toml", WITHOUT_TERM, "–"))
-        yield Table(
+        caption = (
             "What was put into the arm, in SI units; the terms that represent it; and their values in the model that "
             "the filter used. Coulomb friction is the mean of its levels up and down, and half their difference is an "
-            "offset or a part of gravity. Presliding friction is the part of Coulomb friction that reverses gradually.",
-            ("Joint", "Effect", "Put in", "Term", "Estimated"),
-            tuple(rows),
-            "put-in",
-            "llllr",
+            "offset or a part of gravity. Presliding friction is the part of Coulomb friction that reverses gradually."
         )
+        yield Table(caption, ("Joint", "Effect", "Put in", "Term", "Estimated"), rows, "put-in", "llllr")
 
 
 def used_parameters(context: Context, joint: str) -> dict[str, str]:

@@ -65,16 +65,20 @@ def traces(context: Context, run: HapticRun) -> Figure:
         Line(t, run.true_force[few], "true", "black", "solid"),
         Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
     )
-    return Figure(
+    caption = (
         f"Simulated, hand “{hand_name(context, run.hand)}” in and out of the tissue, contact shaded. Positions from "
         "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the "
-        f"felt force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}",
-        f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
-        f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",
-        (Panel("Position", "time [s]", "position [mm]", positions), Panel("Force", "time [s]", "force [N]", forces)),
-        f"haptic-{run.hand}",
-        height=42,
+        f"felt force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}"
     )
+    alt = (
+        f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
+        f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N."
+    )
+    panels = (
+        Panel("Position", "time [s]", "position [mm]", positions),
+        Panel("Force", "time [s]", "force [N]", forces),
+    )
+    return Figure(caption, alt, panels, f"haptic-{run.hand}", height=42)
 
 
 def response_figure(response: HapticResponse) -> Figure:
@@ -84,16 +88,16 @@ def response_figure(response: HapticResponse) -> Figure:
         line, at = Line(response.frequency, y, "", "blue", "solid"), VLine(response.at_frequency)
         return Panel(name, "frequency [Hz]", unit, (line, at, *marks), x_log=True)
 
-    return Figure(
+    caption = (
         "Simulated: the felt stiffness over the true one, and the delay of the felt force, over the frequency of the "
-        "hand's motion in the tissue.",
-        f"Two curves over frequency: the felt share of the stiffness, {response.felt_share.min():.2f} to "
-        f"{response.felt_share.max():.2f}, and its delay, at most {MS * response.felt_late.max():.0f} ms.",
-        (
-            panel("Felt stiffness over true", "share", response.felt_share, HLine(1.0)),
-            panel("Delay of the felt force", "delay [ms]", MS * response.felt_late),
-        ),
-        "haptic-response",
-        columns=2,
-        height=42,
+        "hand's motion in the tissue."
     )
+    alt = (
+        f"Two curves over frequency: the felt share of the stiffness, {response.felt_share.min():.2f} to "
+        f"{response.felt_share.max():.2f}, and its delay, at most {MS * response.felt_late.max():.0f} ms."
+    )
+    panels = (
+        panel("Felt stiffness over true", "share", response.felt_share, HLine(1.0)),
+        panel("Delay of the felt force", "delay [ms]", MS * response.felt_late),
+    )
+    return Figure(caption, alt, panels, "haptic-response", columns=2, height=42)

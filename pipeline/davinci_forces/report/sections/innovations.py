@@ -125,16 +125,13 @@ def figure(context: Context, e: Explanation) -> Figure:
         *(with_motion(moved[field], of) for field, of in INNOVATION_FIELDS if field in moved),
     )
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
-    return Figure(
+    caption = (
         f"{name}, the worst run of this joint: innovations, their autocorrelation, their cumulative periodogram "
         "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "
-        "95 % (grey) and 99 % (blue).",
-        f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
-        panels,
-        f"innovations-{e.log}-{e.joint}",
-        columns=2,
-        height=30,
+        "95 % (grey) and 99 % (blue)."
     )
+    alt = f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}."
+    return Figure(caption, alt, panels, f"innovations-{e.log}-{e.joint}", columns=2, height=30)
 
 
 def over_time(t: Track, field: str, of: str) -> Panel:

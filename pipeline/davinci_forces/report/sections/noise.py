@@ -100,24 +100,21 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
         return
     whiteness = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
     name = run_name(average)
-    yield Figure(
+    caption = (
         f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
         "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "
-        "position and velocity.",
-        f"{name}: the mean of {count(average.periods, 'period')}, the spectrum of its position, and its derivatives.",
-        (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0])),
-        columns=2,
-        height=42,
+        "position and velocity."
     )
-    yield Figure(
+    alt = f"{name}: the mean of {count(average.periods, 'period')}, the spectrum of its position, and its derivatives."
+    panels = (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0]))
+    yield Figure(caption, alt, panels, columns=2, height=42)
+    caption = (
         f"{name}: the noise that averaging removed. Noise of each period over that of the median period; histogram of "
         "the effort noise with the normal density of the same standard deviation; normal probability plot of the "
-        "position noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
-        f"{name}: the noise of each period, and its distribution and autocorrelation.",
-        tuple(noise_panels(period_residuals[0], average, whiteness)),
-        columns=2,
-        height=42,
+        "position noise; autocorrelation of the velocity noise with the 95 % band of white noise."
     )
+    alt = f"{name}: the noise of each period, and its distribution and autocorrelation."
+    yield Figure(caption, alt, tuple(noise_panels(period_residuals[0], average, whiteness)), columns=2, height=42)
 
 
 def one_period(average: Average, signal: Signal) -> Panel:

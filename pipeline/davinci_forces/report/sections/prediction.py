@@ -93,15 +93,13 @@ def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
     name, windows = parts.run_name(p), parts.spans(context.study.log(p.log).contact, "contact")
     error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
-    return Figure(
+    caption = (
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
-        "and their difference.",
-        f"{name}: the model error is {size}.",
-        (
-            parts.effort_panel(p, *windows),
-            Panel("Measured minus model", "time [s]", label(p, "tau", "effort"), (*windows, error)),
-        ),
-        f"prediction-figure-{p.log}-{p.joint}",
-        zoomable=True,
-        height=32,
-    )  # fmt: skip
+        "and their difference."
+    )
+    alt = f"{name}: the model error is {size}."
+    panels = (
+        parts.effort_panel(p, *windows),
+        Panel("Measured minus model", "time [s]", label(p, "tau", "effort"), (*windows, error)),
+    )
+    return Figure(caption, alt, panels, f"prediction-figure-{p.log}-{p.joint}", zoomable=True, height=32)

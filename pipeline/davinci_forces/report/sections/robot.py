@@ -60,9 +60,6 @@ def chain(context: Context) -> Figure3D:
     for pose in context.catalogue.records(Pose):
         x, y, z = links_in_space(pose).T
         marks.append(Line3D(x, y, z, *configurations[pose.pose]))
-    return Figure3D(
-        "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
-        "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",
-        tuple(marks),
-        height=110,
-    )
+    caption = "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between."
+    alt = "The robot's links as lines in space at three configurations, and the cloud of places of its tip."
+    return Figure3D(caption, alt, tuple(marks), height=110)

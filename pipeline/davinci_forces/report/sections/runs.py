@@ -79,19 +79,17 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = parts.run_name(t), parts.spans(context.study.log(t.log).contact, "stated contact")
     largest = float(abs(t.tau_ext_smooth[parts.converged_rows(t.t)]).max(initial=0.0))
-    return Figure(
+    caption = (
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
-        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band.",
-        f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}.",
-        (
-            Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
-            parts.effort_panel(t, *windows),
-            external_effort_panel(t, *windows),
-        ),
-        f"track-figure-{t.log}-{t.joint}",
-        zoomable=True,
-        height=30,
-    )  # fmt: skip
+        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band."
+    )
+    alt = f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}."
+    panels = (
+        Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
+        parts.effort_panel(t, *windows),
+        external_effort_panel(t, *windows),
+    )
+    return Figure(caption, alt, panels, f"track-figure-{t.log}-{t.joint}", zoomable=True, height=30)
 
 
 def external_effort_panel(t: Track, *spans: VSpan) -> Panel:

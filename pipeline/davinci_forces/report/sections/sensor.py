@@ -55,14 +55,10 @@ def figure(forces: Sequence[SensorForce]) -> Figure:
     log = literal(forces[0].log)
     shown = [force for force in forces if force.axis != VECTOR] or [*forces]
     largest = max(force.force_error_max for force in shown)
-    return Figure(
-        f"{log}: the force by the sensor, and the estimated force with its 95 % band.",
-        f"The estimated force in {log} over that of the sensor; they are at most {largest:.2g} N apart along an axis.",
-        tuple(panel(force, i == 0) for i, force in enumerate(shown)),
-        f"sensor-time-{forces[0].log}",
-        zoomable=True,
-        height=32,
-    )
+    caption = f"{log}: the force by the sensor, and the estimated force with its 95 % band."
+    alt = f"The estimated force in {log} over that of the sensor; they are at most {largest:.2g} N apart along an axis."
+    panels = tuple(panel(force, i == 0) for i, force in enumerate(shown))
+    return Figure(caption, alt, panels, f"sensor-time-{forces[0].log}", zoomable=True, height=32)
 
 
 def panel(force: SensorForce, named: bool) -> Panel:

@@ -43,15 +43,13 @@ def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     yield from (verdict(context, limit, tissues) for limit in limits if tissues)
     yield Prose(f"{model(context, limits)}\n\n{without_delay(context)}")
     yield limits_table(context, limits)
-    yield Figure(
+    caption = (
         "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
-        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay.",
-        "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force.",
-        (map_panel(context, tissues), delay_panel(context, limits, tissues)),
-        "stability-limits",
-        columns=2,
-        height=62,
+        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay."
     )
+    alt = "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force."
+    panels = (map_panel(context, tissues), delay_panel(context, limits, tissues))
+    yield Figure(caption, alt, panels, "stability-limits", columns=2, height=62)
     yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 
@@ -95,14 +93,13 @@ def model(context: Context, limits: list[HandLimit]) -> str:
     agree = f"Here they agree within {100.0 * max(apart):.1f} %. " if apart else ""
     return (
         "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
-        f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is "
-        "that of a hand that is pressed into elastic tissue and stays in contact. Formula, response and simulation "
-        "state the same limit: the formula takes the filter's lag and gain, from logs if there are any, at the "
-        "frequency at which the hand would oscillate; the response and the simulation contain the filter itself. "
-        f"{agree}The last column of [@stability-table] says what each row includes. They also assume messages at "
-        f"{haptics.link_rate:g} Hz with {delay} but the wait for a message, and a controller at {haptics.rate:g} Hz; "
-        f"{scales}. State others, and other hands, in a scenario: `davinci-forces haptics --template` prints one, with "
-        "all that it assumes."
+        f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is that of a hand that is "
+        "pressed into elastic tissue and stays in contact. Formula, response and simulation state the same limit: the "
+        "formula takes the filter's lag and gain, from logs if there are any, at the frequency at which the hand would "
+        f"oscillate; the response and the simulation contain the filter itself. {agree}The last column of "
+        f"[@stability-table] says what each row includes. They also assume messages at {haptics.link_rate:g} Hz with "
+        f"{delay} but the wait for a message, and a controller at {haptics.rate:g} Hz; {scales}. State others, and "
+        "other hands, in a scenario: `davinci-forces haptics --template` prints one, with all that it assumes."
     )
 
 
@@ -176,17 +173,15 @@ def motions(context: Context) -> Iterator[Figure]:
         tuple(Line(getattr(run, x), getattr(run, y), *LAWS[run.switching], "solid") for run in runs)
         for x, y in (("hand_x", "hand_dx"), ("t", "hand_x"), ("t", "V"))
     )
-    yield Figure(
+    caption = (
         f"The same hand and tissue of {k_t}, above both limits of arbitrary switching. The motion is unstable under "
         "the worst switching, and stable if the tissue acts only in contact. Under the worst switching V is not the "
-        "stored energy, so V can rise.",
-        "A spiral that grows under the worst switching, and one that shrinks to rest if the tissue acts in contact.",
-        (
-            Panel("Phase plane", label(runs[0], "hand_x"), label(runs[0], "hand_dx"), phase),
-            Panel("Position", "time [s]", label(runs[0], "hand_x"), position),
-            Panel("Energy", "time [s]", label(runs[0], "V"), energy, y_log=True),
-        ),
-        "stability-motion",
-        columns=3,
-        height=52,
+        "stored energy, so V can rise."
     )
+    alt = "A spiral that grows under the worst switching, and one that shrinks to rest if the tissue acts in contact."
+    panels = (
+        Panel("Phase plane", label(runs[0], "hand_x"), label(runs[0], "hand_dx"), phase),
+        Panel("Position", "time [s]", label(runs[0], "hand_x"), position),
+        Panel("Energy", "time [s]", label(runs[0], "V"), energy, y_log=True),
+    )
+    yield Figure(caption, alt, panels, "stability-motion", columns=3, height=52)

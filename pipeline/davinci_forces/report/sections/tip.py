@@ -120,16 +120,14 @@ def log_blocks(
 ) -> Iterator[Block]:
     """The figures of one log."""
     name = literal(force.log)
-    yield Figure(
+    caption = (
         f"{name}: force at the tip with its 95 % band."
         f"{' Windows of contact are shaded.' if contact is not None else ''} Where a joint stands still, its friction "
-        "may take up any effort, so the band is wide.",
-        f"Components of the force at the tip over time in {name}.",
-        tuple(component_panel(force, axis, contact) for axis in "xyz"),
-        f"tip-time-{force.log}",
-        zoomable=True,
-        height=32,
+        "may take up any effort, so the band is wide."
     )
+    alt = f"Components of the force at the tip over time in {name}."
+    panels = tuple(component_panel(force, axis, contact) for axis in "xyz")
+    yield Figure(caption, alt, panels, f"tip-time-{force.log}", zoomable=True, height=32)
     if contact is not None:
         yield in_space(force, contact)
     if budget is not None:
@@ -167,15 +165,13 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
     )
-    return Figure3D(
+    caption = (
         f"{literal(force.log)}: the path of the tip, and the largest force of each contact, numbered in the order "
         f"of [@tip-contacts]; 1 N is drawn {Number(1e3 * per_newton, 'mm', digits=2)} long. The black line at "
-        "its end is the 95 % interval along the least certain direction.",
-        f"The path of the tip in space in {literal(force.log)}, with the largest force of each contact as an arrow.",
-        marks,
-        f"tip-space-{force.log}",
-        height=88,
+        "its end is the 95 % interval along the least certain direction."
     )
+    alt = f"The path of the tip in space in {literal(force.log)}, with the largest force of each contact as an arrow."
+    return Figure3D(caption, alt, marks, f"tip-space-{force.log}", height=88)
 
 
 def line(points: Column, name: str, colour: Colour, arrow: bool = False) -> Line3D:

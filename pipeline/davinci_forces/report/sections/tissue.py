@@ -109,15 +109,13 @@ def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Fi
     residual = Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(typical, misfit)))
     why = "The stiffness of this push is nearest to that of the log." if tissue.pushes else "No push counts."
     third = "the distribution of the stiffness of pushes" if many else "its force on the way in and out (hysteresis)"
-    return Figure(
+    caption = (
         f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
-        f"residual of the line; and {third}. {why}",
-        f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}.",
-        (line_panel(pushes, typical), residual, last),
-        f"tissue-{tissue.log}",
-        columns=3,
-        height=46,
+        f"residual of the line; and {third}. {why}"
     )
+    alt = f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}."
+    panels = (line_panel(pushes, typical), residual, last)
+    return Figure(caption, alt, panels, f"tissue-{tissue.log}", columns=3, height=46)
 
 
 def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
@@ -176,13 +174,10 @@ def surface_map(tissue: Stiffness) -> Figure:
         x, y = MM * places[across][place == i], MM * places[along][place == i]
         marks.append(Points(x, y, f"{edges[i]:.0f} to {edges[i + 1]:.0f} N/m", colour))
     name, number = literal(tissue.log), count(len(tissue), "push")
-    return Figure(
-        f"{name}: stiffness over the surface, at the deepest sample of each push in contact.",
-        f"Where {number} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
-        (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", tuple(marks)),),
-        f"tissue-map-{tissue.log}",
-        height=70,
-    )
+    caption = f"{name}: stiffness over the surface, at the deepest sample of each push in contact."
+    alt = f"Where {number} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m."
+    panels = (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", tuple(marks)),)
+    return Figure(caption, alt, panels, f"tissue-map-{tissue.log}", height=70)
 
 
 def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]:

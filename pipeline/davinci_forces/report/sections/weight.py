@@ -133,15 +133,15 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
         caused = Line(load.t, mass * load.load + offsets[load.joint], f"{by} mass", "vermillion", "dashed")
         effort = label(load, "tau_ext", "external effort")
         panels.append(Panel(title(load.joint), "time [s]", effort, (measured, caused)))
-    return Figure(
+    caption = (
         f"{name}: external effort {once} of each joint that carries the mass{subtracted}, and the effort of the {by} "
-        "mass plus the joint's offset of the day.",
-        f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
-        f"{Number(mass, 'kg')}.",
-        tuple(panels),
-        f"weight-figure-{weight.log}",
-        height=35,
+        "mass plus the joint's offset of the day."
     )
+    alt = (
+        f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
+        f"{Number(mass, 'kg')}."
+    )
+    return Figure(caption, alt, tuple(panels), f"weight-figure-{weight.log}", height=35)
 
 
 def by_joint(context: Context, weight: Weight) -> Table:

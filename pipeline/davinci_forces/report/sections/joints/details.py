@@ -40,18 +40,13 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     alike = f" {' and '.join(map(estimator_name, same))} {verb} the same as least squares." if same else ""
     models = (Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items())
     differences = (Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items())
-    yield Figure(
-        f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares.{alike}",
-        f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
-        (
-            Panel("Averaged effort and models", "time [s]", effort,
-                  (Line(plain.t, plain.tau, "measured", "sky"), *models)),
-            Panel("Difference from least squares", "time [s]", effort, tuple(differences)),
-        ),
-        f"estimators-{fit.group}",
-        columns=2,
-        height=46,
-    )  # fmt: skip
+    caption = f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares.{alike}"
+    alt = f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most."
+    panels = (
+        Panel("Averaged effort and models", "time [s]", effort, (Line(plain.t, plain.tau, "measured", "sky"), *models)),
+        Panel("Difference from least squares", "time [s]", effort, tuple(differences)),
+    )
+    yield Figure(caption, alt, panels, f"estimators-{fit.group}", columns=2, height=46)
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
@@ -64,15 +59,13 @@ def convergence(context: Context, joint: str) -> Iterator[Figure]:
         Line(np.arange(1.0, len(s) + 1.0), s.best_mse, f"{s.walls} walls", WALLS.get(s.walls, "")) for s in searches
     )
     unit = label(searches[0], "best_mse", "mean squared error")
-    yield Figure(
-        f"{title(joint)}: the least mean squared error of the swarm after each iteration, of "
-        f"{searches[0].searched} parameters by {searches[0].particles} particles. The least error that the known signs "
-        f"allow: {ends}.",
-        f"Squared error over iterations, falling until it stays: {ends}.",
-        (Panel("", "iteration", unit, lines, x_log=True, y_log=True),),
-        f"swarm-{joint}",
-        height=42,
+    caption = (
+        f"{title(joint)}: the least mean squared error of the swarm after each iteration, of {searches[0].searched} "
+        f"parameters by {searches[0].particles} particles. The least error that the known signs allow: {ends}."
     )
+    alt = f"Squared error over iterations, falling until it stays: {ends}."
+    panels = (Panel("", "iteration", unit, lines, x_log=True, y_log=True),)
+    yield Figure(caption, alt, panels, f"swarm-{joint}", height=42)
 
 
 def excess_in_words(excess: float) -> str:
@@ -95,13 +88,10 @@ def correlations(context: Context, joint: str) -> Iterator[Block]:
         pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
         strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
         numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
-        yield Figure(
-            f"{title(joint)}: correlation of the errors of its parameters (least squares).",
-            f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
-            (Panel("", "", "", (Tiles(record.correlation, numbered),)),),
-            f"correlation-{joint}",
-            height=12.0 + 9.0 * len(names),
-        )
+        caption = f"{title(joint)}: correlation of the errors of its parameters (least squares)."
+        alt = f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}."
+        panels = (Panel("", "", "", (Tiles(record.correlation, numbered),)),)
+        yield Figure(caption, alt, panels, f"correlation-{joint}", height=12.0 + 9.0 * len(names))
 
 
 def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
@@ -111,17 +101,15 @@ def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
         return
     shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:MAX_PANELS]
     more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
-    yield Figure(
+    caption = (
         f"{title(joint)}: friction (the effort minus all other terms of the model) over velocity, while the joint "
         "gains speed and while it loses speed, and the model's friction. Points are means in bins of "
         "velocity, bars their standard deviations. If the two branches differ, friction depends on the past, or "
-        f"changes more slowly than the sign of the velocity.{more}",
-        f"Friction over velocity of {name_in_sentence(joint)}: {friction_in_words(shown[0])}",
-        tuple(friction_panel(m) for m in shown),
-        f"friction-{joint}",
-        columns=2 if len(shown) > 1 else 1,
-        height=48,
+        f"changes more slowly than the sign of the velocity.{more}"
     )
+    alt = f"Friction over velocity of {name_in_sentence(joint)}: {friction_in_words(shown[0])}"
+    panels = tuple(friction_panel(m) for m in shown)
+    yield Figure(caption, alt, panels, f"friction-{joint}", columns=2 if len(shown) > 1 else 1, height=48)
 
 
 def friction_panel(m: FrictionMap) -> Panel:

@@ -31,32 +31,26 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
     averaged = bool(moved) and len(moved[0].q) == len(errors)
     kind = "averaged" if averaged else "low-passed"
-    yield Figure(
-        f"{name}: {kind} effort and model ({who}), the residual of the model, and its normal probability plot.",
-        f"{name}: the model follows the {kind} effort up to {errors.std():.2g} (root mean square).",
-        (
-            effort_panel(residual, heading=f"{kind.capitalize()} effort and model"),
-            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
-            normal_plot("Residual", errors, label(residual, "tau", "residual")),
-        ),
-        f"fit-figure-{place}",
-        columns=3,
-        height=34,
+    caption = f"{name}: {kind} effort and model ({who}), the residual of the model, and its normal probability plot."
+    alt = f"{name}: the model follows the {kind} effort up to {errors.std():.2g} (root mean square)."
+    panels = (
+        effort_panel(residual, heading=f"{kind.capitalize()} effort and model"),
+        Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+        normal_plot("Residual", errors, label(residual, "tau", "residual")),
     )
+    yield Figure(caption, alt, panels, f"fit-figure-{place}", columns=3, height=34)
     q = moved[0].q if averaged else None
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    yield Figure(
+    caption = (
         f"{name}: the residual against position and velocity (points: means in 40 bins with standard errors; line: "
         "mean of each direction), its autocorrelation, and its cross-correlation with the motion (grey: 95 % band of "
-        "white noise).",
-        f"{name}: {in_words(residual, errors, q)}",
-        (*against, *own_correlations(context, residual, errors, q)),
-        f"residual-figure-{place}",
-        columns=2,
-        height=34,
+        "white noise)."
     )
+    alt = f"{name}: {in_words(residual, errors, q)}"
+    drawn = (*against, *own_correlations(context, residual, errors, q))
+    yield Figure(caption, alt, drawn, f"residual-figure-{place}", columns=2, height=34)
     yield Prose(in_words(residual, errors, q))
 
 

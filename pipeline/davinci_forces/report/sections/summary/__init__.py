@@ -45,14 +45,10 @@ def section(context: Context) -> Iterator[Block]:
     if panels:
         # What is left on page one beside the table and lines of results.
         room = ANSWER_HEIGHT - HEIGHT_OF_A_LINE * (len(lines) + max(len(panels) - MAX_IN_COLUMN, 0))
-        yield Figure(
-            caption(contacts, panels),
-            f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
-            tuple(in_column(panels)),
-            label="answer-figure",
-            columns=2 if len(panels) > MAX_IN_COLUMN else 1,
-            height=room / min(len(panels), MAX_IN_COLUMN),
-        )
+        alt = f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}."
+        columns, height = 2 if len(panels) > MAX_IN_COLUMN else 1, room / min(len(panels), MAX_IN_COLUMN)
+        drawn = tuple(in_column(panels))
+        yield Figure(caption(contacts, panels), alt, drawn, "answer-figure", columns=columns, height=height)
     yield trust_table(context, trusts)
     yield Prose(rule_in_words(trusts))
     looks = first_looks_in_order(context, trusts)
@@ -109,7 +105,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     logs, joints = ({getattr(track, about) for track in context.catalogue.records(Track)} for about in ("log", "joint"))
     stated = sum(int(contact.stated.sum()) for contact in contacts)
     above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
-    unstated = count(sum(len(contact) for contact in contacts) - stated, "contact")
+    unstated = sum(len(contact) for contact in contacts) - stated
+    found = f"{count(unstated, 'contact')} found above"
     text = (
         f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
         f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
@@ -127,11 +124,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
         doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
         level = "the alarm level, which free motion crosses at most once in ten minutes"
-        text = f"{text} **{unstated} found above {level}; the study states none.{peaks}**"
+        text = f"{text} **{found} {level}; the study states none.{peaks}**"
         return f"{text}{doubt}" if small else text
-    outside = (
-        "" if unstated.startswith("0") else f" Outside the stated windows, {unstated} found above the alarm level."
-    )
+    outside = f" Outside the stated windows, {found} the alarm level." if unstated else ""
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
     fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
     exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level{fewer}."
@@ -157,13 +152,12 @@ def largest_peaks(context: Context, contacts: list[Contact]) -> str:
 
 def efforts_in_words(context: Context) -> str:
     """The efforts of the robot's joints with their units."""
-    kinds = {(joint.kind, joint.effort) for joint in context.study.robot.joints}
-    words = {
-        (Kind.REVOLUTE, ""): "torque [N m] at joints that turn",
-        (Kind.PRISMATIC, ""): "force [N] at joints that slide",
-    }
-    currents = ["motor current [A] where the torque constant is unknown"] if any(effort for _, effort in kinds) else []
-    return as_list([*(text for kind, text in words.items() if kind in kinds), *currents])
+    words = {Kind.REVOLUTE: "torque [N m] at joints that turn", Kind.PRISMATIC: "force [N] at joints that slide"}
+    kinds = {joint.kind for joint in context.study.robot.joints if not joint.effort}
+    efforts = [text for kind, text in words.items() if kind in kinds]
+    if any(joint.effort for joint in context.study.robot.joints):
+        efforts.append("motor current [A] where the torque constant is unknown")
+    return as_list(efforts)
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
