@@ -3,6 +3,7 @@ meaning away.
 """
 
 import re
+from itertools import groupby
 from typing import Literal, NamedTuple
 
 from davinci_forces.files import visible
@@ -44,7 +45,11 @@ def parse(text: str) -> tuple[Span, ...]:
     for match in MARK.finditer(text):
         spans += [Span("text", text[place : match.start()]), _span(match)]
         place = match.end()
-    return _joined([*spans, Span("text", text[place:])])
+    joined = list[Span]()
+    for is_text, group in groupby([*spans, Span("text", text[place:])], lambda span: span.kind == "text"):
+        alike = list(group)
+        joined += [Span("text", "".join(span.text for span in alike))] if is_text else alike
+    return tuple(span._replace(text=printable(span.text)) for span in joined if span.text)
 
 
 def _span(match: re.Match[str]) -> Span:
@@ -59,14 +64,3 @@ def _span(match: re.Match[str]) -> Span:
 def _unescaped(text: str) -> str:
     """A marked text without the backslashes of `literal`."""
     return re.sub(r"\\([\\$`*\[\]])", r"\1", text)
-
-
-def _joined(spans: list[Span]) -> tuple[Span, ...]:
-    """The spans with neighbouring texts merged and empty texts removed."""
-    joined: list[Span] = []
-    for span in spans:
-        if span.kind == "text" and joined and joined[-1].kind == "text":
-            joined[-1] = Span("text", joined[-1].text + printable(span.text))
-        elif span.text:
-            joined.append(Span(span.kind, printable(span.text), span.to))
-    return tuple(joined)
