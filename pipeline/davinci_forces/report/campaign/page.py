@@ -69,14 +69,14 @@ def change_in_words(series: Series, findings: Findings) -> str:
     """State how a number drifts or varies."""
     name = f"**{where(series)}**"
     if line := findings.slopes.get(series.key):
-        slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
+        slope = Number(line[0], f"{format_unit(series.unit)} a {findings.unit}".strip(), line[1])
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
 
 
 def where(series: Series) -> str:
     """The joint and the number."""
-    return f"{title(series.joint)}, {literal(words(series.name))}"
+    return f"{title(series.joint)}, {literal(series.name.replace('_', ' '))}"
 
 
 def date(study: CampaignStudy) -> str:
@@ -100,7 +100,8 @@ def joint_section(
     """The numbers of one joint of the robot of these studies, drawn and listed."""
     of_joint = [series for series in findings.every if (series.robot, series.joint) == (studies[0].robot, joint)]
     names = list(dict.fromkeys(series.name for series in of_joint))
-    changed = sorted({series.name for series in of_joint if findings.has_change(series)})
+    changing = {*findings.slopes, *findings.varying, *findings.outliers}
+    changed = sorted({series.name for series in of_joint if series.key in changing})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
     caption = (
@@ -136,11 +137,6 @@ def table(
     return Table(f"{title(joint)}: {content}, in every study.", header, tuple(rows), f"campaign-{label}", align)
 
 
-def words(name: str) -> str:
-    """A number's name as it is printed."""
-    return name.replace("_", " ")
-
-
 def cell(study: CampaignStudy, key: str | None) -> Cell:
     """A number of a study, or a dash."""
     stated = study.numbers.get(key) if key else None
@@ -156,15 +152,16 @@ def panel(series: Series, findings: Findings) -> Panel:
     std = np.nan_to_num(series.std)
     marks: list[AnyMark] = []
     if limits := findings.limits.get(series.key):
-        marks.append(Band(t[inside], limits.centre - limits.width, limits.centre + limits.width, "", "grey"))
-        marks.append(HLine(limits.centre, "", "grey", "solid"))
+        centre, width = limits
+        marks.append(Band(t[inside], centre - width, centre + width, "", "grey"))
+        marks.append(HLine(centre, "", "grey", "solid"))
     if inside:
         marks.append(Points(t[inside], series.value[inside], "", "blue", std[inside]))
     if out:
         names = tuple(series.studies[i].name for i in out)
         marks.append(Points(t[out], series.value[out], "", "vermillion", std[out], names))
     unit = format_unit(series.unit)
-    name, label = words(series.name), "" if findings.by_date else "study"
+    name, label = series.name.replace("_", " "), "" if findings.by_date else "study"
     x_range = None if findings.by_date else (min(findings.time.values()) - 0.5, max(findings.time.values()) + 0.5)
     heading = f"{name} [{unit}]" if unit else name
     return Panel(name, label, heading, tuple(marks), x_range, x_dates=findings.by_date)

@@ -52,7 +52,6 @@ class CampaignStudy:
         return f"[{words}]({self.report})"
 
 
-DAY = 86400.0  # [s]
 Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
 
 
@@ -110,20 +109,6 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
         yield Series(studies[0].robot, joint, name, unit, those, keys, value, std)
 
 
-class Slope(NamedTuple):
-    """Drift of a number per day or per study, with its standard error."""
-
-    value: float
-    std: float
-
-
-class ControlLimits(NamedTuple):
-    """The weighted mean of the studies that do not stand out, and the distance of the control limits at each."""
-
-    centre: float
-    width: Array
-
-
 @dataclass(frozen=True)
 class Findings:
     """The series that drift, vary beyond their errors or stand out, corrected for the number of tests."""
@@ -131,10 +116,12 @@ class Findings:
     every: tuple[Series, ...]
     by_date: bool
     time: Mapping[str, float]  # of each study [days since 1970], or its number in order
-    slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of the series that drift
+    slopes: Mapping[Place, tuple[float, float]] = field(default_factory=dict)  # with errors, of the series that drift
     varying: frozenset[Place] = frozenset()
     outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
-    limits: Mapping[Place, ControlLimits] = field(default_factory=dict)  # of the series of three such studies or more
+    # The weighted mean of the studies that do not stand out, and the distance of the control limits at each; of the
+    # series of three such studies or more.
+    limits: Mapping[Place, tuple[float, Array]] = field(default_factory=dict)
     inside: float = 0.0  # share of further values in control that keep the limits
     tests: int = 0
     chance: float = 0.0  # that any test gives a false alarm
@@ -151,7 +138,3 @@ class Findings:
     def stand_out(self, one: Series) -> tuple[int, ...]:
         """Indices of the studies of a series that stand out."""
         return self.outliers.get(one.key, ())
-
-    def has_change(self, one: Series) -> bool:
-        """Whether a series drifts, varies or has studies that stand out."""
-        return one.key in self.slopes or one.key in self.varying or bool(self.stand_out(one))

@@ -12,24 +12,23 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.files import read_bytes, write_bytes
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import drift
 from davinci_forces.report.campaign.page import render_campaign
 from davinci_forces.report.campaign.studies import (
-    DAY,
     FLOORS,
     CampaignStudy,
-    ControlLimits,
     Findings,
     JointVerdict,
     Place,
     Series,
-    Slope,
     every_series,
 )
 from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
 from davinci_forces.runner.results import stated
 
+DAY = 86400.0  # [s]
 FALSE_ALARM_PROBABILITY = 0.05  # for all tests of a page together
 IN_CONTROL = 0.9973  # share of values in control that keep the limits: three standard deviations, if normal
 
@@ -103,14 +102,14 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     time = {study.name: float(i) for i, study in enumerate(studies, 1)}
     if by_date:  # [days since 1970]
         time = {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
-    slopes: dict[Place, Slope] = {}
+    slopes: dict[Place, tuple[float, float]] = {}
     tests: dict[Test, float] = {}
     for row in series:
         if len(row.value) < 2 or not (np.isfinite(row.value).all() and np.isfinite(row.std).all()):
             continue
         line = drift.trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
         if line is not None:
-            slopes[row.key] = Slope(line.slope, line.std)
+            slopes[row.key] = line.slope, line.std
             tests["drift", row.key, 0] = line.p
         tests["scatter", row.key, 0] = drift.scatter(row.value, row.std)
         probabilities = drift.outlier_probabilities(row.value, row.std).tolist()
@@ -126,9 +125,9 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     )  # fmt: skip
 
 
-def limits_of(row: Series, odd: tuple[int, ...]) -> ControlLimits | None:
+def limits_of(row: Series, odd: tuple[int, ...]) -> tuple[float, Array] | None:
     """The control limits of a series, without the studies that stand out; None if too few have standard errors."""
     value, std = (np.delete(column, odd) for column in (row.value, row.std))
     if len(value) < drift.MIN_VALUES_TREND or not np.isfinite([value, std]).all():
         return None
-    return ControlLimits(*drift.control_limits(value, std, IN_CONTROL))
+    return drift.control_limits(value, std, IN_CONTROL)
