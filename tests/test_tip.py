@@ -288,8 +288,8 @@ def test_a_force_that_is_known_nowhere_is_still_shown():
     made = run("davinci", tracks("davinci", efforts("davinci", PUSH)))
     force, contact = made[TipForce], made[TipContact]
     unknown = replace(force, **dict.fromkeys(TipForce.UNKNOWN, np.full(len(T), np.nan)))
-    assert np.isnan(tip.component_panel(unknown, "x", None).marks[-1].y).all()
-    line = tip.component_panel(force, "z", contact).marks[-1]
+    assert np.isnan(tip.component_panel(unknown, "x", []).marks[-1].y).all()
+    line = tip.component_panel(force, "z", [contact]).marks[-1]
     assert line.x[0] == pytest.approx(force.t[0] + 1.0)
     assert line.y.max() == pytest.approx(12.0)
     assert verdicts.NEAR_SINGULAR == tip_force.NEAR_SINGULAR

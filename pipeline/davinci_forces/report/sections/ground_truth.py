@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.records import Column, TipContact, TipForce, Track
+from davinci_forces.records import TipContact, TipForce, Track
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import first_on_paper, of_joint, run_name, section_of
+from davinci_forces.report.sections.parts import F, first_on_paper, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import truth_level
 
 PUSH_SHAPES = {
@@ -31,7 +31,6 @@ EFFECTS = (
     ("presliding (LuGre): stiffness; damping", "{bristle_stiffness:g}; {bristle_damping:g}", "presliding friction"),
 )
 WITHOUT_TERM = "none: the current is measured"
-COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
 
@@ -59,9 +58,11 @@ def section(context: Context) -> Iterator[Block]:
     figures: list[Figure] = []
     for log in context.study.truth.get("log", []):
         for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
-            tracks = context.catalogue.select(Track, log=log["name"], joint=str(joint))
-            pushes = [push for push in log["push"] if push.get("joint") == joint]
-            figures += [effort_figure(track, pushes) for track in tracks]
+            curve = {
+                "External effort": ("tau_ext_smooth", [push for push in log["push"] if push.get("joint") == joint])
+            }
+            for track in context.catalogue.select(Track, log=log["name"], joint=str(joint)):
+                figures.append(compared_figure(track, f"{run_name(track)}: external effort", "external effort", curve))
     tip = list(tip_forces(context))
     yield from tip
     shown = 0 if tip else 1  # figures on paper, if no force at the tip is compared there
@@ -121,33 +122,17 @@ def parameters(
         yield Table(caption, ("Parameter", "True", "Estimated", "Error"), tuple(rows))
 
 
-def effort_figure(track: Track, pushes: list[Push]) -> Figure:
-    """The effort exerted on a joint, and the smoother's estimate of it."""
-    effort = label(track, "tau_ext", "external effort")
-    panel = compared_panel("External effort", effort, track.t, track.tau_ext_smooth, pushes)
-    return compared_figure(f"{run_name(track)}: external effort", (panel,))
-
-
-def force_figure(force: TipForce, pushes: list[Push]) -> Figure:
-    """The components of the force at the tip, estimated and true."""
+def compared_figure(
+    record: Track | TipForce, subject: str, meaning: str, curves: dict[str, tuple[str, list[Push]]]
+) -> Figure:
+    """Efforts or forces of one log over time: of each panel, by its heading, the estimated field and the pushes."""
     panels = []
-    for k, name in enumerate(COMPONENTS):
-        along = [push | {"peak": force_of(push)[k]} for push in pushes]
-        unit = label(force, name, "force")
-        panels.append(compared_panel(f"Along {name[-1]}0", unit, force.t, getattr(force, name), along))
-    return compared_figure(f"{literal(force.log)}: force at the tip", tuple(panels))
-
-
-def compared_panel(heading: str, unit: str, t: Column, estimated: Column, pushes: list[Push]) -> Panel:
-    """An effort or a force over time, estimated and true."""
-    marks = Line(t, estimated, "estimated", "vermillion"), Line(*true_effort(pushes, float(t[-1])), "true", "black")
-    return Panel(heading, "time [s]", unit, marks)
-
-
-def compared_figure(subject: str, panels: tuple[Panel, ...]) -> Figure:
-    """The panels of one log."""
+    for heading, (field, pushes) in curves.items():
+        estimated = Line(record.t, getattr(record, field), "estimated", "vermillion")
+        true = Line(*true_effort(pushes, float(record.t[-1])), "true", "black")
+        panels.append(Panel(heading, "time [s]", label(record, field, meaning), (estimated, true)))
     caption, alt = f"{subject}, estimated and true.", f"{subject} over time, estimated and true."
-    return Figure(caption, alt, panels, columns=len(panels), height=42)
+    return Figure(caption, alt, tuple(panels), columns=len(panels), height=42)
 
 
 def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
@@ -175,8 +160,13 @@ def tip_forces(context: Context) -> Iterator[Block]:
     if pairs:
         yield comparison(context, pairs)
         yield truth_verdict("Force at the tip", [size for pair in pairs for size in errors_in_deviations(*pair)])
-    forces = [force for force in context.catalogue.records(TipForce) if force.log in pushed]
-    figures = [force_figure(force, pushed[force.log]) for force in forces]
+    figures = []
+    for force in (force for force in context.catalogue.records(TipForce) if force.log in pushed):
+        curves = {
+            f"Along {f[-1]}0": (f, [push | {"peak": force_of(push)[k]} for push in pushed[force.log]])
+            for k, f in enumerate(F)
+        }
+        figures.append(compared_figure(force, f"{literal(force.log)}: force at the tip", "force", curves))
     yield from first_on_paper(figures, "Force at the tip, estimated and true, in other logs", "more-tip-truth")
 
 
@@ -187,8 +177,8 @@ def force_of(push: Push) -> list[float]:
 
 def errors_in_deviations(contact: TipContact, i: int, push: Push) -> list[float]:
     """The error of each component in standard deviations."""
-    names = zip(COMPONENTS, force_of(push), strict=True)
-    return [abs(float(getattr(contact, f)[i]) - true) / float(getattr(contact, f"{f}_std")[i]) for f, true in names]
+    of_axes = zip(F, force_of(push), strict=True)
+    return [abs(float(getattr(contact, f)[i]) - true) / float(getattr(contact, f"{f}_std")[i]) for f, true in of_axes]
 
 
 def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Table:
@@ -196,14 +186,14 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
     rows = []
     for contact, i, push in pairs:
         true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
-        numbers = context.numbers(f"tip.{contact.log}.{i + 1}", COMPONENTS)
+        numbers = context.numbers(f"tip.{contact.log}.{i + 1}", F)
         worst = f"{max(errors_in_deviations(contact, i, push)):.1f}"
         rows.append((literal(contact.log), str(i + 1), *true, *numbers, worst))
     caption = (
         "The largest force at the tip in each contact [N], true and estimated, and the error of the worst component in "
         "standard deviations. The true force is the peak of the push; the estimate can peak at another instant."
     )
-    header = ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error")
+    header = ("Log", "Contact", *(f"true ${f}$" for f in F), *(f"${f}$" for f in F), "Error")
     return Table(caption, header, rows, "tip-truth", "llrrrrrrr")
 
 

@@ -17,6 +17,7 @@ from davinci_forces.report.verdicts import Trust, decisive, mass_level
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
+F = ("f_x", "f_y", "f_z")  # components of the force at the tip
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 

@@ -13,10 +13,9 @@ from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, Line, Line3D, Points3D
 from davinci_forces.report.content.number import MINUS, Number
 from davinci_forces.report.context import Context, label, name_in_sentence
-from davinci_forces.report.sections.parts import converged_rows, section_of, spans, strokes
+from davinci_forces.report.sections.parts import F, converged_rows, section_of, spans, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
-F = ("f_x", "f_y", "f_z")
 PATH_POINTS = 600  # points drawn of the path in space
 REACH = 0.5  # drawn length of the largest force over the extent of the path
 
@@ -40,27 +39,23 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
         "tip-force",
     )
     yield Prose(correlations(forces))
-    contacts = {contact.log: contact for contact in context.catalogue.records(TipContact)}
+    contacts = context.catalogue.records(TipContact)
     if contacts:
-        yield contact_table(context, list(contacts.values()))
+        yield contact_table(context, contacts)
     yield level_table(context, forces)
     for force in forces:
         if band(force.force_coverage) == "bad":
             covers = f"it covers {percent(force.force_coverage)} of samples in free space"
             text = f"**{literal(force.log)}**: the 95 % band of the force is too narrow: {covers}. "
             yield Verdict("bad", f"{text}Trust the detection level rather than the standard deviations.")
-    budgets = {budget.log: budget for budget in context.catalogue.records(TipBudget)}
-    first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
-    yield from log_blocks(context, first, contacts.get(first.log), budgets.get(first.log))
+    touched = {contact.log for contact in contacts}
+    # With contact first, then those not fitted, then by the detection level.
+    levels = {f.log: (f.log in touched, f.role != "identification", np.nan_to_num(f.force_detection)) for f in forces}
+    first, *others = sorted(forces, key=lambda force: levels[force.log], reverse=True)
+    yield from log_blocks(context, first)
     for force in others:
-        inside = tuple(log_blocks(context, force, contacts.get(force.log), budgets.get(force.log)))
+        inside = tuple(log_blocks(context, force))
         yield OnScreen(f"Force at the tip in {literal(force.log)}", f"tip-{force.log}", inside)
-
-
-def priority(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bool, float]:
-    """The order of logs: with contact first, then those not fitted, then by the detection level of the force."""
-    level = force.force_detection if np.isfinite(force.force_detection) else 0.0
-    return force.log in contacts, force.role != "identification", level
 
 
 def correlations(forces: Sequence[TipForce]) -> str:
@@ -115,32 +110,29 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     return Table(caption, header, rows, "tip-levels", "llrrrrrr")
 
 
-def log_blocks(
-    context: Context, force: TipForce, contact: TipContact | None, budget: TipBudget | None
-) -> Iterator[Block]:
+def log_blocks(context: Context, force: TipForce) -> Iterator[Block]:
     """The figures of one log."""
-    name = literal(force.log)
+    name, contacts = literal(force.log), context.catalogue.select(TipContact, log=force.log)
     caption = (
         f"{name}: force at the tip with its 95 % band."
-        f"{' Windows of contact are shaded.' if contact is not None else ''} Where a joint stands still, its friction "
+        f"{' Windows of contact are shaded.' if contacts else ''} Where a joint stands still, its friction "
         "may take up any effort, so the band is wide."
     )
     alt = f"Components of the force at the tip over time in {name}."
-    panels = tuple(component_panel(force, axis, contact) for axis in "xyz")
+    panels = tuple(component_panel(force, axis, contacts) for axis in "xyz")
     yield Figure(caption, alt, panels, f"tip-time-{force.log}", zoomable=True, height=32)
-    if contact is not None:
-        yield in_space(force, contact)
-    if budget is not None:
+    yield from (in_space(force, contact) for contact in contacts)
+    for budget in context.catalogue.select(TipBudget, log=force.log):
         sizes = ((joint, context.number(f"tip.{force.log}.{joint}.total", 2)) for joint in budget.of_joint)
         parts = as_list([f"{size} by {name_in_sentence(joint)}" for joint, size in sizes])
         yield Prose(f"Standard deviation of the force at the tip in {name}, at the median pose: {parts}.")
 
 
-def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:
+def component_panel(force: TipForce, axis: str, contacts: Sequence[TipContact]) -> Panel:
     """One component over time."""
     shown = converged_rows(force.t)
     t, f, std = force.t[shown], getattr(force, f"f_{axis}")[shown], np.sqrt(getattr(force, f"c_{axis}{axis}")[shown])
-    windows = [] if contact is None else list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))
+    windows = [w for c in contacts for w in zip(c.onset.tolist(), c.release.tolist(), strict=True)]
     marks: tuple[AnyMark, ...] = (
         *spans(windows),
         Band(t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
