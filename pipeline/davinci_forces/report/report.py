@@ -5,6 +5,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 from davinci_forces.records import Contact, LogSummary, Stiffness
@@ -14,7 +15,7 @@ from davinci_forces.report.content import Document, Rated, Section, name_of, wal
 from davinci_forces.report.content.inline import parse
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import MANIFEST, collect, identity, manifest
-from davinci_forces.report.sections import DOCUMENTS, section_builder
+from davinci_forces.report.sections import DOCUMENTS
 from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import fitted_joints, largest_peaks, trust_row
@@ -69,7 +70,8 @@ def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
     built: list[Section] = []
     for name in names:
         labels = {label for section in built for block in walk(section) if (label := name_of(block))}
-        if section := section_builder(name)(replace(context, labels=frozenset(labels))):
+        module = import_module(f"davinci_forces.report.sections.{name}")
+        if section := module.section(replace(context, labels=frozenset(labels))):
             built.append(section)
     return tuple(built)
 

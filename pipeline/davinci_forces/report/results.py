@@ -78,11 +78,10 @@ class Results(dict[str, Result]):
             return
         assert record.origin is not None
         std = cell(record, number.std, number.row)[0] if number.std else math.nan
+        known_std = std if math.isfinite(std) else None
         row = "" if number.row is None else f"[{record.row_name(number.row)}]"
         source = f"processed/{record.origin.path}#{number.field}{row}"
-        self[number.key] = Result(
-            number.key, value, std if math.isfinite(std) else None, unit, source, record.origin.sha256
-        )
+        self[number.key] = Result(number.key, value, known_std, unit, source, record.origin.sha256)
 
     def truth(self, key: str, value: float, unit: str, path: tuple[str, ...], sha256: str) -> None:
         """Put a number of a simulated study's ground truth under a key; `path` leads to it in truth.toml."""

@@ -41,9 +41,7 @@ class Heading:
     """
 
     title: str
-    entries: tuple[
-        tuple[str, float, int], ...
-    ]  # text, distance from the left [mm], lines below the first of the legend
+    entries: tuple[tuple[str, float, int], ...]  # text, distance from the left [mm], lines below the first entry
     legend_lines: int
     across: bool = False
 

@@ -96,10 +96,9 @@ def lines(
     x: float, y: float, text: str, size: float, height: float = LINE_HEIGHT, anchor: str = "middle", bold: bool = False
 ) -> str:
     """Lines of words, `height` [mm] apart, the first one with its anchor at x and its middle at y [pt]."""
+    start = y + BASELINE * size
     rows = enumerate(text.split("\n"))
-    return "".join(
-        words(x, y + i * height * POINT + BASELINE * size, row, WORDS, size, anchor, bold) for i, row in rows
-    )
+    return "".join(words(x, start + i * height * POINT, row, WORDS, size, anchor, bold) for i, row in rows)
 
 
 def draw_heading(heading: Heading, marks: tuple[AnyMark | Line3D | Points3D, ...], left: float, bottom: float) -> str:

@@ -5,12 +5,6 @@ section(context: Context) -> Section | None        None if a study has no such c
 They share `parts`, where `section_of` makes this function of one that yields blocks.
 """
 
-from collections.abc import Callable
-from importlib import import_module
-
-from davinci_forces.report.content import Section
-from davinci_forces.report.context import Context
-
 # The file, the title and the sections of each document.
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "report": (
@@ -22,9 +16,3 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation", "thesis")),
 }  # fmt: skip
 SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)
-
-
-def section_builder(name: str) -> Callable[[Context], Section | None]:
-    """The function that builds the section of that name."""
-    build: Callable[[Context], Section | None] = import_module(f"davinci_forces.report.sections.{name}").section
-    return build

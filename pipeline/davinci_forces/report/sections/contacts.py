@@ -48,8 +48,12 @@ def section(context: Context) -> Iterator[Block]:
         header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Mean", "Impulse", "Verdict")
         earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
         of_contacts: list[tuple[Cell, ...]] = []
+        names = ("onset", "release", "peak", "mean", "impulse")
         for contact in contacts:
-            of_contacts += rows(context, contact, earlier[contact.joint])
+            for i in range(len(contact)):
+                numbers = context.numbers(f"contact.{contact.log}.{contact.joint}.{i + 1}", names)
+                number = str(earlier[contact.joint] + i + 1)
+                of_contacts.append((*run_cells(contact), number, *numbers, verdict(contact, i)))
             earlier[contact.joint] += len(contact)
         yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
@@ -104,15 +108,6 @@ def largest(contacts: list[Contact]) -> tuple[int, ...]:
     """The rows of the `PRINTED` largest peaks over their joint's detection level, in the order of the table."""
     ratios = np.concatenate([np.abs(contact.peak) / contact.detection_level for contact in contacts])
     return tuple(sorted(np.argsort(-ratios, kind="stable")[:PRINTED].tolist()))
-
-
-def rows(context: Context, contact: Contact, earlier: int) -> Iterator[tuple[Cell, ...]]:
-    """One row a window, numbered after the `earlier` ones of its joint."""
-    for i in range(len(contact)):
-        key = f"contact.{contact.log}.{contact.joint}.{i + 1}"
-        onset, release, peak, mean, impulse = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
-        number = str(earlier + i + 1)
-        yield (*run_cells(contact), number, onset, release, peak, mean, impulse, verdict(contact, i))
 
 
 def verdict(contact: Contact, i: int) -> str:

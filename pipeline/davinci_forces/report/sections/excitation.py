@@ -52,15 +52,13 @@ def source_label(e: Excitation) -> str:
 def figure(context: Context, trajectories: list[Excitation]) -> Figure:
     """One period of each trajectory of a joint, within its limits."""
     first = trajectories[0]
-    limits = context.study.robot.joint(first.joint).limits
+    limits, name = context.study.robot.joint(first.joint).limits, title(first.joint)
     panels = []
     for symbol, meaning in MOTION.items():
         named = symbol == "q"  # once is enough: the colours are the same in every panel
         lines = [Line(e.t, getattr(e, symbol), source_label(e) if named else "") for e in trajectories]
         bounds = [HLine(bound, "limits" if named and i == 0 else "") for i, bound in enumerate(getattr(limits, symbol))]
         panels.append(Panel(meaning.capitalize(), "time [s]", label(first, symbol, meaning), (*lines, *bounds)))
-    caption = (
-        f"{title(first.joint)}: one period of the published trajectories and of the designed one, with the limits."
-    )
-    alt = f"Position, velocity and acceleration over a period of the {title(first.joint)} trajectories."
+    caption = f"{name}: one period of the published trajectories and of the designed one, with the limits."
+    alt = f"Position, velocity and acceleration over a period of the {name} trajectories."
     return Figure(caption, alt, tuple(panels), columns=3, height=55)

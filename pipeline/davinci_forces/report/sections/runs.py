@@ -46,10 +46,8 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     yield from parts.first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
     others = [t for t in tracks if t not in worst and not t.at_rest]
     if others:
-        folded = tuple(
-            OnScreen(parts.run_name(t), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others
-        )
-        yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
+        runs = tuple(OnScreen(parts.run_name(t), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others)
+        yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", runs)
 
 
 def scores(context: Context, tracks: list[Track]) -> Table:

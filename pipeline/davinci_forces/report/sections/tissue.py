@@ -35,7 +35,7 @@ def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
         "without delay. Samples at rest are not used, because friction can then take any value."
     )
     yield comparison(context, tissues)
-    forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]
+    forces = [figure for tissue in tissues for figure in force_figure(context, tissue)]
     maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > MIN_SPACING_MAP]
     yield from (*forces[:FIGURES_ON_PAPER], *maps[:FIGURES_ON_PAPER])
     models = context.catalogue.records(TissueModel)
@@ -84,15 +84,6 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     return Table(caption, header, tuple(rows), "tissue-table", "llrrrrr")
 
 
-def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
-    """Force against depth of one log, if its pushes were recorded."""
-    pushes = {push.push: push for push in context.catalogue.select(Push, log=tissue.log)}
-    typical = pushes.get(int(tissue.push[nearest(tissue)]))
-    if typical is not None:
-        few = tissue.push[evenly(len(tissue), PUSHES_PER_PANEL)].tolist()
-        yield force_figure(tissue, [pushes[number] for number in few if number in pushes], typical)
-
-
 def nearest(tissue: Stiffness) -> int:
     """The push whose stiffness is nearest to that of the log; if no push is used, the push with the best line."""
     if not tissue.pushes:
@@ -100,10 +91,15 @@ def nearest(tissue: Stiffness) -> int:
     return int(np.argmin(np.where(tissue.counted == 1, np.abs(tissue.k_t - tissue.stiffness), np.inf)))
 
 
-def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Figure:
+def force_figure(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     """Pushes with the line of a typical push, the residual of this line, and its hysteresis or a histogram."""
-    name = literal(tissue.log)
-    many = len(tissue) > MAX_PUSHES_LISTED
+    recorded = {push.push: push for push in context.catalogue.select(Push, log=tissue.log)}
+    typical = recorded.get(int(tissue.push[nearest(tissue)]))
+    if typical is None:
+        return
+    few = tissue.push[evenly(len(tissue), PUSHES_PER_PANEL)].tolist()
+    pushes = [recorded[number] for number in few if number in recorded]
+    name, many = literal(tissue.log), len(tissue) > MAX_PUSHES_LISTED
     last = spread_panel(tissue) if many else hysteresis_panel(typical)
     misfit = typical.force - typical.intercept - typical.k_t * typical.depth
     residual = Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(typical, misfit)))
@@ -115,7 +111,7 @@ def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Fi
     )
     alt = f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}."
     panels = (line_panel(pushes, typical), residual, last)
-    return Figure(caption, alt, panels, f"tissue-{tissue.log}", columns=3, height=46)
+    yield Figure(caption, alt, panels, f"tissue-{tissue.log}", columns=3, height=46)
 
 
 def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:

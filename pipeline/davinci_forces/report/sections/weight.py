@@ -94,6 +94,8 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     stated = f"{Number(weight.stated_mass, 'kg')} is stated."
     level, why = grade_of_mass(context, weight)
     tests_scale = any(math.isfinite(other.stated_mass) for other in context.catalogue.records(Weight))
+    errors = np.abs(weight.mass_alone - weight.stated_mass) / weight.mass_alone_std
+    worst = literal(weight.loaded[int(np.argmax(errors))])  # the joint that alone is furthest from the stated mass
     others = ": [@weight-table] has scales of other masses" if tests_scale else ""
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
@@ -103,16 +105,11 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "unstated": f". The study states no mass, so none tests the scale of the efforts{others}.",
         "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
-        f"{literal(worst_joint(weight))}, and where the mass hung.",
+        f"{worst}, and where the mass hung.",
         "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
     return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
-
-
-def worst_joint(weight: Weight) -> str:
-    """The joint whose mass, alone, is furthest from the stated one in standard errors."""
-    return str(weight.loaded[int(np.argmax(np.abs(weight.mass_alone - weight.stated_mass) / weight.mass_alone_std))])
 
 
 def turned_joint(weight: Weight) -> str:

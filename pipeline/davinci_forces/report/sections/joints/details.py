@@ -23,11 +23,11 @@ BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (
 
 def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
-    all_residuals = context.catalogue.select(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
-    residuals = {residual.estimator: residual for residual in all_residuals if residual.estimator in LOOKS}
-    if "lse" not in residuals or len(residuals) < 2:
+    records = context.catalogue.select(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
+    residuals = {residual.estimator: residual for residual in records if residual.estimator in LOOKS}
+    plain = residuals.get("lse")
+    if plain is None:
         return
-    plain = residuals["lse"]
     apart = {name: float(abs(r.tau_hat - plain.tau_hat).max()) for name, r in residuals.items()}
     same = [name for name in MEANT_TO_DIFFER if name in apart and apart[name] < ALIKE * plain.tau.std()]
     residuals = {name: r for name, r in residuals.items() if name not in same}

@@ -109,20 +109,18 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
 
 def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
     """Middles of the equal bins of x with samples, the mean of y in each bin, and its standard error."""
-    number, middles = full_bins(x, bins)
-    count = np.bincount(number)
-    mean = np.bincount(number, y) / count
-    return middles, mean, np.sqrt(np.bincount(number, (y - mean[number]) ** 2)) / count
+    number, middles, mean = full_bins(x, y, bins)
+    return middles, mean, np.sqrt(np.bincount(number, (y - mean[number]) ** 2)) / np.bincount(number)
 
 
-def full_bins(x: Column, bins: int) -> tuple[Counts, Column]:
-    """Divide the range of x into equal bins: the number of each sample among the bins with samples, and their middles.
+def full_bins(x: Column, y: Column, bins: int) -> tuple[Counts, Column, Column]:
+    """Equal bins of x with samples: the number of each sample's bin, the middles, and the mean of y in each bin.
 
     `binned_statistic` does likewise, but importing it takes most of a second.
     """
     edges = np.linspace(x.min(), x.max(), bins + 1)
     full, number = np.unique(np.clip(np.searchsorted(edges, x, "right") - 1, 0, bins - 1), return_inverse=True)
-    return number, (edges[full] + edges[full + 1]) / 2
+    return number, (edges[full] + edges[full + 1]) / 2, np.bincount(number, y) / np.bincount(number)
 
 
 def correlation(x: Column, y: Column, lags: Counts) -> Column:
@@ -137,9 +135,8 @@ def explained_by(x: Column, y: Column, bins: int = 40) -> float:
 
     The correlation ratio with Wherry's correction, 0 if y does not depend on x in any way.
     """
-    number, middles = full_bins(x, bins)
-    means, ranges = np.bincount(number, y) / np.bincount(number), len(middles)
+    number, _, means = full_bins(x, y, bins)
     unexplained, spread = float(np.sum((y - means[number]) ** 2)), float(y.var() * len(y))
-    if not spread or len(y) <= ranges:
+    if not spread or len(y) <= len(means):
         return 0.0
-    return 1.0 - unexplained / spread * (len(y) - 1) / (len(y) - ranges)
+    return 1.0 - unexplained / spread * (len(y) - 1) / (len(y) - len(means))

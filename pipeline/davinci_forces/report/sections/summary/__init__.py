@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, FreeSpace, Stiffness, Track
+from davinci_forces.records import Contact, Stiffness, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
@@ -197,12 +197,10 @@ def named_peaks(track: Track, contact: Contact) -> Points:
     for start, end in zip(contact.onset[rows], contact.release[rows], strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
-    t, sizes, width = track.t[places], np.abs(contact.peak[rows]), WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
-    covered = [(sizes[np.abs(t - at) < width] > size).any() for at, size in zip(t, sizes, strict=True)]
-    names = tuple(
-        "" if near else f"{p:+.3g}".replace("-", "−") for near, p in zip(covered, contact.peak[rows], strict=True)
-    )
-    return Points(t, contact.peak[rows], "", "black", names=names)
+    t, peaks, width = track.t[places], contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
+    largest = [(np.abs(peaks[np.abs(t - at) < width]) <= abs(p)).all() for at, p in zip(t, peaks, strict=True)]
+    names = tuple(f"{p:+.3g}".replace("-", "−") if named else "" for named, p in zip(largest, peaks, strict=True))
+    return Points(t, peaks, "", "black", names=names)
 
 
 def spoken(contact: Contact) -> str:
@@ -239,12 +237,8 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     r2, ceiling = (context.number(f"{scored}.{name}", 4, std=None) for name in ("r2", "r2_ceiling"))
     size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
     wanted = (size,) if with_sought else ()
-    band = trusted.narrowest
-    covers = coverage_in_words(band) if band is not None else "–"
+    covers = "–"
+    if (band := trusted.narrowest) is not None:
+        words = band_in_words(band.coverage, band.coverage_std)
+        covers = percent(band.coverage) + (f", {words}" if words.startswith("too") else "")
     return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
-
-
-def coverage_in_words(space: FreeSpace) -> str:
-    """The coverage of a 95 % band, and whether it is too narrow or too wide."""
-    words = band_in_words(space.coverage, space.coverage_std)
-    return percent(space.coverage) + (f", {words}" if words.startswith("too") else "")

@@ -106,9 +106,8 @@ def currents_in_words(context: Context) -> str:
         f"{factor} on {as_list(names) if len(names) <= MAX_NAMED else f'each of {len(names)} joints'}"
         for factor, names in joints.items()
     ]
-    stated = context.study.changed
-    listed = [joint.name for joint in context.study.joints_by_current if joint.name not in stated]
-    whose = " (by the robot’s description: check your drives)" if listed else ""
+    is_listed = any(joint.name not in context.study.changed for joint in context.study.joints_by_current)
+    whose = " (by the robot’s description: check your drives)" if is_listed else ""
     return f" 1 A of a motor counts as {'; '.join(factors)}{whose}." if factors else ""
 
 
