@@ -1,5 +1,6 @@
 """What sections compute and decide, on small records whose answer is known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,6 +94,13 @@ def test_friction_has_a_curve_a_direction_and_one_of_each_branch_where_it_has_a_
     assert [bool(line.label) for line in drawn] == [True] + [False] * (lines - 1)
     assert all(np.all(np.sign(line.x) == np.sign(line.x[0])) and np.all(np.diff(line.x) >= 0) for line in drawn)
     assert friction_in_words(friction(model)) == "-3.5 on average backwards and 3.5 forwards."
+
+
+@pytest.mark.parametrize("model", ["independent", "chosen"])
+def test_the_legend_names_the_model_s_friction_where_no_sample_gains_speed_or_one_is_at_rest(model):
+    for changed in ({"gaining": np.zeros(8, int)}, {"dq": np.r_[0.0, friction(model).dq[1:]]}):
+        drawn = [*friction_curves(replace(friction(model), **changed))]
+        assert [bool(line.label) for line in drawn] == [True] + [False] * (len(drawn) - 1)
 
 
 def test_an_innovation_is_drawn_from_its_second_second_on_wherever_the_log_starts():

@@ -126,14 +126,11 @@ def friction_panel(m: FrictionMap) -> Panel:
 
 def friction_curves(m: FrictionMap) -> Iterator[Line]:
     """The model's friction: one curve for both branches if it has no memory, else one curve for each."""
-    branches = [np.flatnonzero(m.gaining == gaining) for gaining in (1, 0)]
-    for rows in branches if m.model != "independent" else [np.arange(len(m))]:
-        ordered = rows[np.argsort(m.dq[rows], kind="stable")]
-        for side in (m.dq[ordered] < 0, m.dq[ordered] > 0):
-            part = ordered[side]
-            if len(part):
-                is_first = part[0] == ordered[0] and (rows is branches[0] or m.model == "independent")
-                yield Line(m.dq[part], m.tau_friction_hat[part], "model" if is_first else "", "black", "solid")
+    branches = [m.gaining == 1, m.gaining == 0] if m.model != "independent" else [np.full(len(m), True)]
+    order = np.argsort(m.dq, kind="stable")
+    curves = (order[(branch & side)[order]] for branch in branches for side in (m.dq < 0, m.dq > 0))
+    for i, rows in enumerate(rows for rows in curves if len(rows)):
+        yield Line(m.dq[rows], m.tau_friction_hat[rows], "" if i else "model", "black", "solid")
 
 
 def friction_in_words(m: FrictionMap) -> str:
