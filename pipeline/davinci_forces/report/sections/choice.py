@@ -9,34 +9,14 @@ from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import section_of
+from davinci_forces.report.sections.parts import explanation, section_of
 
 
 @section_of("Choice of the model", "choice", Choice)
 def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
     """The choice with its scores."""
     choice = choices[0]
-    yield Prose(
-        "A candidate model has a structure: `independent` (each joint by itself) or `coupled` (through the arm's "
-        "links). A name after + is added friction: `smooth` (continuous at zero velocity), `stribeck` (larger near "
-        "rest), or one to three `dahl` elements (elastic before sliding; the percentages are their presliding "
-        "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
-        "is refitted without a sixth of the path, without half of it, and without each log if the others move as many "
-        "joints together. Its score is the error on the data left out over the RMS effort, averaged over moving "
-        "joints; effort and prediction pass the same low-pass. With periods left out, extra parameters lower the error "
-        "even if they overfit, as all periods follow one path. With blocks of path left out, on raw samples, the error "
-        "is that to expect on a new path; the model is chosen by it."
-    )
-    yield Prose(
-        "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
-        "or the delay of the effort after the motion, adds one term, or changes the width or distance of one. It has "
-        "to reduce the error on four or more of the six parts of the path. The model after the earliest step whose "
-        "error is within one standard error of the least is taken. Then joints share the links' parameters, or each "
-        "keeps its own (“joint by joint”) where all models that share are clearly worse: by more than one standard "
-        "error of the difference. Sharing is preferred, as it alone holds for any motion of the joints together. Of "
-        "the candidates with fixed terms, the simplest that is not clearly worse than the best is taken, unless the "
-        "searched model errs less."
-    )
+    yield from map(Prose, explanation("choice").split("\n\n"))
     why = choice.why.removeprefix(choice.chosen)  # the choice is named once
     it = "It" if why != choice.why else ""
     yield Verdict("info", f"**Chosen: “{literal(choice.chosen)}”.** {it}{literal(why)}.")

@@ -9,7 +9,7 @@ from davinci_forces.records import Contact, Stiffness, Track, Weight, by_name
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import run_cells, section_of
+from davinci_forces.report.sections.parts import explanation, run_cells, section_of
 from davinci_forces.report.verdicts import is_small
 from davinci_forces.study import LogEntry
 
@@ -21,20 +21,7 @@ def section(context: Context) -> Iterator[Block]:
     """All contact windows, and the recordings that were not analysed."""
     contacts = context.catalogue.records(Contact)
     if contacts:
-        yield Prose(
-            "Each contact is measured on every joint that moves in the log, and on a joint at rest if the contact is "
-            "found there. Its window is stated in study.toml, or is the time in which the smoothed external effort "
-            "exceeds the alarm level, which free motion crosses at most once in ten minutes, if the interval of the "
-            "peak, without its flattening, does not hold zero. Onset and release are the times at which the effort "
-            "leaves zero and returns to it. Mean and impulse (mean times time) are those of measured minus modelled "
-            "effort, which no smoothing moves out of the window. The peak is the largest external effort in the "
-            "window, and at least the mean. Smoothing flattens a plateau not at all, and the tip of a triangle most: "
-            "half of what a tip would lose is added to the peak, and half to its error. Standard errors are the spread "
-            "over windows of the same length in free space; that of an impulse includes those of onset and release if "
-            "no window is stated, and that of a peak the smoother's standard deviation there. Peaks are judged by the "
-            "lower detection level: 99 % of the samples of the joint's worst run in free space stay below it. Alarm "
-            f"levels: {alarm_levels(context, contacts)}."
-        )
+        yield Prose(explanation("contacts", levels=alarm_levels(context, contacts)))
         yield peaks(context, contacts)
         yield from by_time(context, contacts)
         caption = (

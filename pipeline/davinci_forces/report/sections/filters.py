@@ -7,21 +7,13 @@ from davinci_forces.records import Comparison, FilterNoise, Streamed, Track
 from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Line, Points
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import run_cells, section_of
+from davinci_forces.report.sections.parts import explanation, run_cells, section_of
 
 
 @section_of("The filter", "filters", FilterNoise)
 def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
     """Tuning, error budget and comparison."""
-    yield Prose(
-        "The filter assumes noise of position, velocity and effort. The standard deviations of this noise maximise the "
-        "likelihood of the innovations (each measurement minus its prediction) in identification logs, where nothing "
-        "touches the robot. The external effort is modelled as a random walk. Identification logs cannot show how fast "
-        "the external effort may change: a filter tuned to them would miss pushes. So a test push decides, a half-sine "
-        "of 1 s. The random walk is the smallest with which the filter shows 90 % of the peak of this push, at most "
-        f"{context.study.settings.delay:g} s late ([@filter-tuning]). With a longer `delay` in study.toml the estimate "
-        "is less noisy."
-    )
+    yield Prose(explanation("filters", delay=f"{context.study.settings.delay:g}"))
     yield tuning(context, noises)
     spaces = [space for noise in noises if (space := context.worst_space(noise.joint)) is not None]
     worst = [t for space in spaces for t in context.catalogue.select(Track, log=space.log, joint=space.joint)]

@@ -24,20 +24,7 @@ INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity")
 @parts.section_of("Innovations", "innovations", Explanation)
 def section(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The verdict on every run, figures of the worst run of each joint, and every test on demand."""
-    yield Prose(
-        "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
-        "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
-        "by the autocorrelation and the cumulative periodogram (power summed over frequency) of the innovations of "
-        "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
-        "combinations, until the tests pass. To remove contact or reversals, their samples are left out. The random "
-        "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
-        "replaced by their maximum-likelihood estimate for this log. A cause is the whole cause if the tests then pass "
-        "with p-values at least a hundred times larger, and fail if as many samples are left out elsewhere. Of other "
-        "causes the share of the correlation is stated. The filter's random walk is chosen to follow pushes. In free "
-        "motion it is larger than necessary, so the innovations are slightly correlated. Bands, levels and standard "
-        "errors of efforts do not rest on white innovations, since they are calibrated on free motion.\n\n"
-        + summary(explained)
-    )
+    yield Prose(f"{parts.explanation('innovations')}\n\n{summary(explained)}")
     yield verdicts(context, explained)
     worst = {(space.joint, space.log) for e in explained if (space := context.worst_space(e.joint)) is not None}
     drawn = sorted((e for e in explained if (e.joint, e.log) in worst), key=lambda e: least_probability(e)[0])

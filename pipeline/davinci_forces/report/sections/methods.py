@@ -10,21 +10,21 @@ from davinci_forces.records import KINDS, LogSummary, Trajectory
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import of_joint, section_of, trust
+from davinci_forces.report.sections.parts import chapters, of_joint, section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
-METHODS, BIBLIOGRAPHY = (Path(__file__).with_name(name) for name in ("methods.md", "references.bib"))
+BIBLIOGRAPHY = Path(__file__).with_name("references.bib")
 ENTRY, FIELD = re.compile(r"@\w+\{.*?^\}", re.M | re.S), re.compile(r"^  (\w+) = \{(.*)\},$", re.M)
 
 
 @section_of("Methods", "methods")
 def section(context: Context) -> Iterator[Block]:
     """Prose and equations in the order of the stages; symbols, thresholds, a paragraph for a paper, and references."""
-    text = text_of(read_bytes(METHODS)).replace("{lowpass}", f"{context.study.settings.lowpass:g}")
-    *methods, (_, symbols) = (chapter.strip().split("\n\n", 1) for chapter in re.split("^# ", text, flags=re.M)[1:])
-    for kind, method in methods:
-        if context.catalogue.records(KINDS[kind]):
-            yield from map(method_block, method.split("\n\n"))
+    methods = chapters("methods.md")
+    symbols = methods.pop("Symbols")
+    for method in (method for kind, method in methods.items() if context.catalogue.records(KINDS[kind])):
+        blocks = method.replace("{lowpass}", f"{context.study.settings.lowpass:g}").split("\n\n")
+        yield from map(method_block, blocks)
     header = ("Quantity", "Measure", "Good", "Caution", "Problem")
     yield Table("The thresholds of the verdicts of this report.", header, thresholds(), "thresholds", "lllll")
     rows = [tuple(line.split(" | ")) for line in symbols.split("\n")]

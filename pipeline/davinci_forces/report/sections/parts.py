@@ -3,10 +3,12 @@
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.arrays import Booleans, evenly, runs
 from davinci_forces.records import Column, Fit, PathShare, Prediction, Record, Residual, TorqueConstant, Track, Weight
 from davinci_forces.records.whiteness import Whiteness
@@ -20,6 +22,18 @@ RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 F = ("f_x", "f_y", "f_z")  # components of the force at the tip
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
+
+
+def chapters(name: str) -> dict[str, str]:
+    """The chapters of a file of text beside this module, by heading; the lines of a paragraph are as in the file."""
+    text = text_of(read_bytes(Path(__file__).with_name(name)))
+    return {heading: body.strip() for heading, body in re.findall(r"^# (\w+)\n(.*?)(?=^# |\Z)", text, re.M | re.S)}
+
+
+def explanation(section: str, **values: str) -> str:
+    """What a section says before its numbers, from explanations.md, with the values of its braces."""
+    paragraphs = chapters("explanations.md")[section].split("\n\n")
+    return "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs).format(**values)
 
 
 def section_of(

@@ -13,18 +13,7 @@ from davinci_forces.report.verdicts import is_out_of_log, percent
 @parts.section_of("Prediction", "prediction", Prediction)
 def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
-    yield Prose(
-        "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
-        "windows, and identification logs. These are predicted by fits that leave out the log, or a group of "
-        "successive logs if a joint has more than 20, and by the chosen model also without blocks of path. Of a joint "
-        "with one log, each period is left out in turn. On the fitted path the fit absorbs part of the model's error, "
-        "so scores there are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
-        '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "both low-passed, after the noise variance is subtracted. Samples at standstill are left out, as friction can "
-        "then take any value. A contact log whose windows the study does not state is scored with its contacts, so it "
-        "is no worst run. A large error of an identification log whose path is mostly new says that no other log "
-        "replaces it, not that the fit is bad."
-    )
+    yield Prose(parts.explanation("prediction"))
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Relative error", "$R^2$", "Ceiling")
     caption = (

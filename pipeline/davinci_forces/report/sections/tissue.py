@@ -10,7 +10,7 @@ from davinci_forces.records import Column, Push, Stiffness, TissueModel
 from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, Histogram, HLine, Line, Points, VSpan
 from davinci_forces.report.context import Context, count, title
-from davinci_forces.report.sections.parts import MM, THESIS_TISSUE, section_of
+from davinci_forces.report.sections.parts import MM, THESIS_TISSUE, explanation, section_of
 from davinci_forces.report.verdicts import is_minority, stiffness_level
 
 FIGURES_ON_PAPER = 1  # figures of force, and as many maps, in the PDF; the others are on screen only
@@ -26,14 +26,7 @@ WAYS: tuple[tuple[int, str, Colour], ...] = ((1, "in", "blue"), (0, "out", "oran
 def section(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     """All tissue logs."""
     yield from (verdict(context, tissue) for tissue in tissues)
-    yield Prose(
-        "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
-        "contact, which begins and ends at the kinks of this curve. A push is used if the line explains 90 % of its "
-        "force beyond noise; the stiffness of a log is the median over the used pushes. The standard error allows for "
-        "correlated residuals, for tissue that differs from place to place, and for the worst effect of the joint "
-        "model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
-        "without delay. Samples at rest are not used, because friction can then take any value."
-    )
+    yield Prose(explanation("tissue"))
     yield comparison(context, tissues)
     forces = [figure for tissue in tissues for figure in force_figure(context, tissue)]
     maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > MIN_SPACING_MAP]

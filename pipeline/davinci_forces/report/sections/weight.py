@@ -10,7 +10,7 @@ from davinci_forces.records import Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import grade_of_mass, run_cells, section_of
+from davinci_forces.report.sections.parts import explanation, grade_of_mass, run_cells, section_of
 from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, percent
 
 
@@ -20,16 +20,7 @@ def section(context: Context) -> Iterator[Block]:
     weights, constants = context.catalogue.records(Weight), context.catalogue.records(TorqueConstant)
     if not weights and not constants:
         return
-    yield Prose(
-        "A mass on a link adds gravity and inertia to the effort of the joints. The mass is estimated as the slope of "
-        "a line: the external effort of all moving joints that carry it (measured minus modelled, low-passed without "
-        "delay), against the effort that 1 kg causes according to the robot's chain. Each joint is weighted by the "
-        "inverse of its model's squared error in free motion. A constant offset of the effort, which differs from day "
-        "to day (offset of the day), is estimated, too, if the data can separate it from the load. The standard error "
-        "combines the error of the fit with that of the run: by a jackknife over six parts of the path, or by the "
-        "spread between periods if that is larger. It is increased if logs without a mass give a mass that it does not "
-        "explain, or if the joints contradict each other: by chance in less than one of a hundred cases."
-    )
+    yield Prose(explanation("weight"))
     if weights:
         yield summary(context, weights)
     yield from (verdict(context, weight) for weight in weights)

@@ -15,7 +15,7 @@ from davinci_forces.report.context import Context, fit_name, name_in_sentence, t
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.details import convergence, correlations, estimators, friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
-from davinci_forces.report.sections.parts import is_of_link, of_free_motion, of_joint, run_name, section_of
+from davinci_forces.report.sections.parts import explanation, is_of_link, of_free_motion, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import is_impossible
 
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
@@ -27,13 +27,7 @@ def section(context: Context) -> Iterator[Block]:
     fits = context.own_fits()
     if not fits:
         return
-    yield Prose(
-        "Each joint is shown with the model that the filter and the smoother used. The standard error of a value has "
-        "two parts. The part from noise follows from the differences between periods. The part from the model is the "
-        "change of the value if blocks of path are left out, if the friction is modelled otherwise, and without the "
-        "ridge, which pulls values towards zero. $z$ is the value over its standard error, both parts together. If "
-        "$abs(z) < 2$, the parameter may be zero, or only its sum with others is determined."
-    )
+    yield Prose(explanation("joints"))
     joints = list(dict.fromkeys(fit.group for fit in fits))
     for joint in joints:
         content = joint_blocks(context, [fit for fit in fits if fit.group == joint])
