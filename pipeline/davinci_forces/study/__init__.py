@@ -102,8 +102,8 @@ class LogEntry:
 
     @property
     def possible_contact(self) -> tuple[tuple[float, float], ...]:
-        """The windows [s] of contact; where a contact log states none but free ones, the time between these."""
-        if self.role != "contact" or self.contact or not self.free:
+        """The windows [s] of contact; where a contact log states free windows, the time between these."""
+        if self.role != "contact" or not self.free:
             return self.contact
         edges = (-math.inf, *(edge for window in sorted(self.free) for edge in window), math.inf)
         return tuple(zip(edges[::2], edges[1::2], strict=True))

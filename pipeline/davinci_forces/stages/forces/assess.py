@@ -29,11 +29,11 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     )
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
-    if entry.role != "contact" and int(smoothed.sum()) >= MIN_FREE_SAMPLES:
-        yield from touch_warning(track, smoothed, robot)
+    if int(smoothed.sum()) >= MIN_FREE_SAMPLES:
+        yield from touch_warning(track, smoothed, entry, robot)
 
 
-def touch_warning(track: Track, free: Booleans, robot: Robot) -> Iterator[Diagnostic]:
+def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -> Iterator[Diagnostic]:
     """Warn of efforts in free motion (N,) that are far above those of the rest of the log, as touches are.
 
     Where the joint slows down to stop or to reverse, its friction may be the cause.
@@ -45,10 +45,15 @@ def touch_warning(track: Track, free: Booleans, robot: Robot) -> Iterator[Diagno
     level = typical_alarm_level(track.tau_ext_smooth, free, track.rate)
     if size.max() > TOUCHED * level > 0.0:
         effort = f"{size.max():.2g} {robot.joint(track.joint).unit('{effort}')}"
+        if entry.role != "contact":
+            remedy = "give the log the role contact, or state its contact windows"
+        elif entry.free:
+            remedy = "leave this time out of its free windows"
+        else:
+            remedy = "add this time to its contact windows, or state in its free windows when nothing touched the arm"
         message = (
             f"{track.log}/{track.joint}: at {track.t[size.argmax()]:.2f} s something seems to touch the arm: the "
-            f"external effort is {effort}, {size.max() / level:.0f} times as large as elsewhere in the log; "
-            "give the log the role contact, or state its contact windows"
+            f"external effort is {effort}, {size.max() / level:.0f} times as large as elsewhere in the log; {remedy}"
         )
         yield diagnostic("assess", f"{track.log}.{track.joint}", "warning", message)
 
