@@ -14,6 +14,7 @@ from davinci_forces.haptics import scenario as haptics
 from davinci_forces.logs import open_log
 from davinci_forces.robots import Robot, from_toml
 from davinci_forces.robots.models import VARIANTS
+from davinci_forces.robots.robot import Joint
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Study
 from davinci_forces.study.entries import check_positive, entries_of, is_inside, lines_of_files
 from davinci_forces.study.guessing import clock_hint
@@ -27,6 +28,7 @@ VARIANT_FITS = tuple(
 )  # fmt: skip
 CHOICES = {"fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *VARIANT_FITS)}
 TRUTH = "truth.toml"  # the ground truth of a simulated study, where its folder has it
+AT_JOINT = 5.0  # torque constant over the robot's, above which it seems to be of the joint, and not of the motor
 OUTDATED_SETTINGS = ("derivative",)  # settings without effect that earlier versions had
 
 
@@ -46,6 +48,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
         table.problem(f"the study's folder is called {name!r}, which is reserved on Windows; rename it")
     title, robot, simulated = table.text("title", name), _robot(table, folder), table.flag("simulated", False)
     overrides = table.table("robot_overrides")
+    listed = robot.joints if robot else ()
     robot = _overridden(robot, overrides) if robot else None
     for name, placed in (("tool", _with_tool), ("base", _with_base)):
         if name in table:
@@ -59,7 +62,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     baseline = _baseline(table, folder)
     logs = entries_of(table, robot)
-    remarks = tuple(_remarks(table, logs))
+    remarks = [*_remarks(table, logs), *(_geared_twice(overrides, listed, robot.joints) if robot else ())]
     table.close()
     lines = lines_of_files(table, logs)
     if table.file.problems():
@@ -71,7 +74,9 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     assert robot is not None
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
     changed = overrides.values | {name: table.values[name] for name in ("tool", "base") if name in table}
-    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, lines, remarks)
+    return Study(
+        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, lines, tuple(remarks)
+    )
 
 
 def _note_missing_clocks(table: TomlTable, logs: Sequence[LogEntry], folder: Path) -> None:
@@ -167,6 +172,19 @@ def _remarks(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
                 f"{table.file.name}:{table.file.line(('log', i, 'role'))}: log {log.name!r} has the role weight, but "
                 "no weight, so no mass is estimated; write weight = { mass = <kg, if known> } for a mass at the tip, "
                 'and with moves_with = "<joint>", position = [x, y, z] in metres from the remote centre for another'
+            )
+
+
+def _geared_twice(overrides: TomlTable, listed: Sequence[Joint], joints: Sequence[Joint]) -> Iterator[str]:
+    """Yield a warning for each torque constant that seems to be at the joint, and is multiplied by the gear ratio."""
+    for before, joint in zip(listed, joints, strict=True):
+        times = abs(joint.torque_constant / before.torque_constant)
+        if times > AT_JOINT and joint.gear_ratio != 1.0 and "gear_ratio" not in overrides.values[joint.name]:
+            line = overrides.file.line((*overrides.path, joint.name, "torque_constant"))
+            yield (
+                f"{overrides.file.name}:{line}: 1 A of {joint.name} counts as {joint.effort_per_ampere:.3g} "
+                f"{joint.unit('{effort}')}: its torque_constant is {times:.2g} times the robot's, its gear_ratio still "
+                f"{joint.gear_ratio:g}; if the constant is at the joint, write gear_ratio = 1.0, too"
             )
 
 
