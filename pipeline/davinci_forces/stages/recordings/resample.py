@@ -25,7 +25,7 @@ VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with the
 MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_VELOCITY_RATIO = 5.0  # beyond it or below its inverse, the log contradicts itself, and is refused
 MAX_BEYOND_LIMITS, IMPOSSIBLE = 2.0, 20.0  # as multiples of a joint's limits; a warning, and a refusal
-OVER_LIMITS = 0.02  # of the range between limits, above which an excess is noted
+OVER_LIMITS, FAR_OVER_LIMITS = 0.02, 0.25  # of the range between limits, above which an excess is noted, or warned of
 USUAL_LIMITS = (2.0 * np.pi, 20.0)  # [rad or m, rad/s or m/s] limits of a joint that states none, only to warn
 MIN_JUMP, MAX_USUAL = 0.5, 20.0  # of the range of a position, and of its usual steps: a longer step is a jump
 UNIT_HINTS = (  # by the ratio of a logged velocity to the derivative of the position; mm only of joints that slide
@@ -177,8 +177,11 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
 
 
 def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Column, Column]) -> Iterator[Diagnostic]:
-    """Note low-passed positions and velocities that exceed the joint's limits by less than a wrong unit would."""
-    beyond, limits = [], (joint.limits.q, joint.limits.dq)
+    """Note low-passed positions and velocities that exceed the joint's limits by less than a wrong unit would.
+
+    Positions far beyond are warned of: with another zero than the robot's, gravity and forces at the tip are wrong.
+    """
+    beyond, limits, severity = [], (joint.limits.q, joint.limits.dq), "note"
     for what, unit, x, (least, most) in zip(("positions", "velocities"), ("", "/s"), smooth, limits, strict=False):
         low, high = np.percentile(x, (1.0, 99.0))
         slack, largest = OVER_LIMITS * (most - least), max(-least, most)
@@ -186,10 +189,15 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
         if exceeds and max(-low, high) <= MAX_BEYOND_LIMITS * largest:
             reach = joint.unit(f"{what} from {low:.3g} to {high:.3g} {{position}}{unit}")
             beyond.append(f"{reach} where the robot states {least:.3g} to {most:.3g}")
+            if what == "positions" and max(least - low, high - most) > FAR_OVER_LIMITS * (most - least):
+                severity = "warning"
     if beyond:
-        remedy = "correct the units, or `limits` in [robot_overrides], by which `excite` designs"
+        remedy = (
+            "correct the units, or the zero of positions (`offset`), on which gravity and forces at the tip depend, or "
+            "`limits` in [robot_overrides], by which `excite` designs"
+        )
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"
-        yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", "note", text)
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", severity, text)
 
 
 def faults(recording: Recording) -> Iterator[str]:
