@@ -106,8 +106,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
     by_current = [] if arm.name.endswith(".urdf") else _joints_by_current(arm.robot, drawn)  # a URDF states no drives
     assumed = [joint.name for joint in by_current if not joint.effort]
-    drives = f"[robot_overrides] of study.toml, where those of {arm.name} are"
-    remark = f"check gear_ratio and torque_constant of {', '.join(assumed)} in {drives}" if assumed else ""
+    where = f"study.toml lists those of {arm.name}, commented out, under [robot_overrides]"
+    remark = f"check gear_ratio and torque_constant of {', '.join(assumed)}: {where}" if assumed else ""
     return Draft(text, arm, tuple(rows), remark)
 
 
@@ -165,7 +165,7 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     yield f"robot = {in_toml(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
     yield "simulated = false"
     if robot.tool:
-        why = "of the tool's shaft: CHECK, forces at the tip depend on it"
+        why = "of the tool's shaft, taken unless stated: CHECK, forces at the tip depend on it"
         yield f"# tool = {{ length = {robot.tool.length} }}  # [m] {why}"
     yield ""
     yield "[settings]  # every key has a default; the report lists the values used"

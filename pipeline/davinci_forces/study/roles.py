@@ -142,7 +142,8 @@ def _by_motion(
     for i in fixed:
         _cover(reach, recordings[i])
     holdings = [recording.holding for recording in recordings]
-    excited = {i: _word(recordings[i].path)[0] == "excitation" for i in rest}
+    words = {i: _word(recordings[i].path) for i in rest}
+    excited = {i: kind == "excitation" for i, (kind, _) in words.items()}
     identifying = {i: holdings[i].repeats or excited[i] for i in rest}
     varied = {joint for i in [*rest, *fixed] if not holdings[i].steady for joint in holdings[i].moving}
     late: list[int] = []
@@ -157,7 +158,7 @@ def _by_motion(
         elif not identifying[i] and set(spans) - set(reach):
             late.append(i)
         elif identifying[i] and (is_tested or any(x > WIDER * reach.get(k, (0.0, ""))[0] for k, x in spans.items())):
-            roles[i] = Role("identification", '"excitation" in its name' if excited[i] else "its motion repeats")
+            roles[i] = Role("identification", f'"{words[i][1]}" in its name' if excited[i] else "its motion repeats")
             _cover(reach, recordings[i])
         elif holding.repeats:
             roles[i] = Role("validation", f"its motion stays within that of {within}, which identifies")
