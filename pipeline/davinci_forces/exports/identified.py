@@ -1,6 +1,6 @@
 """What is exported of a study: the model of each joint with errors, noise and validity, and the head of each file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95, calibrate
+from davinci_forces.maths.uncertainty.error_band import MIN_COVERAGE, NORMAL_95, calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.prediction import CHOSEN
@@ -104,20 +104,32 @@ class Export:
             lines += [f"  {name}: {value:.6g} +- {std:.2g} {unit}".rstrip() for name, value, std, unit in rows]
         return [visible(line) for line in lines]
 
+    def narrow_bands(self) -> Iterator[str]:
+        """Name the joints whose 95 % band is too narrow in free motion, of logs that no fit used if there are any."""
+        for joint in self.joints:
+            spaces = free_spaces(self.catalogue, joint.name)
+            narrowest = min(spaces, key=lambda space: space.coverage, default=None)
+            if narrowest is not None and narrowest.coverage < MIN_COVERAGE:
+                covers = f"+-1.96 std covers {narrowest.coverage:.0%} of its free motion in {narrowest.log}"
+                yield f"warning: {joint.name}: {covers}, not 95 %; judge its external effort by the alarm level"
+
     def remarks(self) -> list[str]:
-        """Name springs that are negative beyond their error, and negative parameters that physics makes positive."""
+        """Name narrow bands, springs that are negative beyond their error, and parameters that physics has positive."""
         advice = (
             "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have: "
             "fit = 'independent.consistent' in [settings]"
         )
         return [
-            f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
-            for fit, model in self.fits.values()
-            for about, name, value, std, unit in zip(
-                terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
-            )
-            if about.term and (about.term.positive or about.term == stiffness)
-            if value < (-NORMAL_95 * std if about.term == stiffness else -SOLVER_ZERO)
+            *self.narrow_bands(),
+            *(
+                f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
+                for fit, model in self.fits.values()
+                for about, name, value, std, unit in zip(
+                    terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
+                )
+                if about.term and (about.term.positive or about.term == stiffness)
+                if value < (-NORMAL_95 * std if about.term == stiffness else -SOLVER_ZERO)
+            ),
         ]
 
     def document(self) -> dict[str, Any]:
@@ -219,6 +231,12 @@ def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: S
     return Export(study, catalogue, identified, tuple(joints), origin)
 
 
+def free_spaces(catalogue: Catalogue, joint: str) -> list[FreeSpace]:
+    """The free spaces of a joint by the exported filter, without those of fitted logs if there are others."""
+    spaces = catalogue.select(FreeSpace, joint=joint, filter=DEFAULT)
+    return [space for space in spaces if space.role != "identification"] or spaces
+
+
 def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Motion]) -> dict[str, Any] | None:
     """The default filter of a joint with its band and its alarm level, as far as free motion gives them.
 
@@ -229,9 +247,7 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
         noise = noise_model(tuned, joint, 1.0 / rate, study.settings.q_tau)
         R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, 1.0 / rate)
         bands = [calibrate(free_errors(band, False)) for band in catalogue.select(ErrorBand, joint=joint.name)]
-        spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
-        unfitted = [space for space in spaces if space.role != "identification"] or spaces
-        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in unfitted]
+        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in free_spaces(catalogue, joint.name)]
         levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
             "rate": rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],

@@ -4,15 +4,20 @@
  * average or gap after gap, give DF_OTHER_RATE with NaN: resample them, or identify from logs at their rate.
  * Every q, dq and ddq is of @COORDINATES@; a joint of a coupled arm needs all of them,
  * each filtered and delayed by the cutoff and the lag of the joint that is computed.
- * q is the position after a Butterworth low-pass of order 4 that runs forwards and backwards: no delay, half the
- * amplitude at the cutoff, no effect if that is at least 0.4 DF_RATE.  dq is the central difference of q, or the measured
- * velocity after the same low-pass; ddq is the central difference of dq.
- * q_measured is the position without low-pass, dq_measured the measured velocity likewise; if only positions are
- * measured, it is the central difference of the position after the same low-pass at @LOWPASS@ Hz.
- * The effort lags the motion, so q, dq, ddq, q_measured and dq_measured are delayed by the lag before they meet tau; if
- * the lag is negative, tau is delayed by its size instead.  If a causal low-pass delays q by D, delay q_measured and
- * dq_measured to the same instant, and tau by D minus the lag.  The standard deviation leaves out what such a delay
- * costs.  An effort that is there without contact, as the offset of a day, has to be subtracted from tau.  Cutoff, lag:
+ * What a sample holds, for each joint with its own cutoff and lag, which are below:
+ *   q            position after the low-pass
+ *   dq           central difference of q, or the measured velocity after the same low-pass
+ *   ddq          central difference of dq
+ *   q_measured   position without low-pass
+ *   dq_measured  measured velocity without low-pass; if only positions are measured, the central difference of the
+ *                position after a low-pass at @LOWPASS@ Hz
+ *   tau          effort, less what is there without contact, as the offset of a day
+ * In a log, the low-pass is a Butterworth filter of order 4, run forwards and backwards: no delay, half the amplitude at
+ * the cutoff, none of it if the cutoff is at least 0.4 DF_RATE.  The effort lags the motion, so all but tau are delayed by
+ * the lag; if that is negative, tau is delayed by its size instead.
+ * In a controller, low-pass by a filter without later samples, which delays q by some D.  Delay q_measured and
+ * dq_measured by D, too, and tau by D minus the lag.  The standard deviation leaves out what such a delay costs.
+ * Cutoff, lag:
 @PROCESSING@
  * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
  * one standard error, never more than the motion loses.  Its memory of a displacement advances in df_step alone.  Both

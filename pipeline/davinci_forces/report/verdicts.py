@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import bdtr
 
 from davinci_forces.maths.arrays import Booleans
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95
+from davinci_forces.maths.uncertainty.error_band import MIN_COVERAGE, NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
 from davinci_forces.records.weight import TorqueConstant, Weight
 from davinci_forces.report.content import Cell, Level
@@ -26,7 +26,7 @@ MAX_SPEED_RATIO = 1.5  # speed of a log over that of the fastest fitted one; the
 MAX_OUTSIDE = 0.1  # share of samples beyond all fitted positions, above which page one says so
 MIN_MOVING = 0.5  # share of a run in motion; at rest, friction takes any value, and the run says nothing of the model
 SMALL = 2.0  # of the alarm level: peaks of contacts below it may be errors of the model
-COVERED = (0.90, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
+COVERED = (MIN_COVERAGE, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit
 WITHIN = {1: 0.6827, 2: 0.95, 4: 0.99994}  # share of right errors below this number of standard errors
 UNLIKELY = 0.01  # probability below which a test fails
