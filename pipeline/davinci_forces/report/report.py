@@ -18,7 +18,7 @@ from davinci_forces.report.results import MANIFEST, collect, identity, manifest
 from davinci_forces.report.sections import DOCUMENTS
 from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.sections.parts import trust
-from davinci_forces.report.sections.summary import fitted_joints, largest_peaks, trust_row
+from davinci_forces.report.sections.summary import fitted_joints, peaks_in_words, trust_row
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
 from davinci_forces.report.sections.summary.opening import forces_at_tip, masses
 from davinci_forces.report.sections.tissue import verdict
@@ -86,11 +86,11 @@ def answer(context: Context) -> str:
         message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
         return "\n".join([message, *measured]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
-    peaks = largest_peaks(context, context.catalogue.records(Contact)).removeprefix(" Largest")
+    peaks = peaks_in_words(context, context.catalogue.records(Contact)).strip()
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
     if looks:
         looks = ["look at these first:", *looks]
-    lines = [*align([HEADER, *rows]), LEGEND, *looks, *[f"contacts, largest{peaks}"] * bool(peaks), *measured]
+    lines = [*align([HEADER, *rows]), LEGEND, *looks, *[plain(peaks)] * bool(peaks), *measured]
     return "\n".join(lines) + "\n"
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Contact, Stiffness, Track, Weight, by_name
+from davinci_forces.records import Contact, Stiffness, Threshold, Track, Weight, by_name
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
@@ -21,13 +21,14 @@ def section(context: Context) -> Iterator[Block]:
     """All contact windows, and the recordings that were not analysed."""
     contacts = context.catalogue.records(Contact)
     if contacts:
-        yield Prose(explanation("contacts", levels=alarm_levels(context, contacts)))
+        yield Prose(explanation("contacts", levels=alarm_levels(context)))
         yield peaks(context, contacts)
         yield from by_time(context, contacts)
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
-            "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Mean and "
-            "impulse: of the stated window, or from onset to release. Verdict: whether the peak exceeds the detection "
+            "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Peak: to "
+            "compare with the largest reading of a gauge, or a steady one. Mean and impulse: of the stated window, or "
+            "from onset to release, with rise and fall. Verdict: whether the peak exceeds the detection "
             "level; “peak only” if it does but stays below the alarm level; “found” for a contact outside the windows "
             "that the study states, and “small” if its peak is below twice the alarm level, so that it may be an error "
             "of the model."
@@ -48,8 +49,9 @@ def section(context: Context) -> Iterator[Block]:
             yield Prose(
                 f"**{', '.join(unknown)}**: where nothing touched the arm is not stated, so the levels do not know its "
                 "path. A small contact that comes back with the period, or at reversals, is an error of the model. "
-                "State windows without contact, `free = [[start, end], ...]`, and the levels hold for this path, too. "
-                "They may be read off this report, a second away from every contact, and stand beside contact windows."
+                "State windows in which nothing touched the arm, `free = [[start, end], ...]`, and the levels hold for "
+                "this path, too. If nobody wrote them down, take times at least a second away from the contacts above. "
+                "`contact` may be stated, too; all other times then count as unknown."
             )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
@@ -85,9 +87,9 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
         yield Table(caption, header, tuple(rows), "contacts-by-time", "ll" + "r" * len(joints))
 
 
-def alarm_levels(context: Context, contacts: list[Contact]) -> str:
+def alarm_levels(context: Context) -> str:
     """The alarm level of each joint, in words."""
-    joints = context.joints_of(contacts)
+    joints = [threshold.joint for threshold in context.catalogue.records(Threshold)]
     return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
 
 
@@ -110,8 +112,9 @@ def peaks(context: Context, contacts: list[Contact]) -> Figure:
     missed = sum(int((contact.above == 0).sum()) for contact in contacts)
     total = sum(len(contact) for contact in contacts)
     caption = (
-        "The peak of every window with its standard error. Peaks in the grey band, below the detection level, cannot "
-        "be distinguished from free space. [@contact-table] has the window of each number."
+        "The peak of every window with its standard error: what the robot exerts, the opposite of a push on it. Peaks "
+        "in the grey band, below the detection level, cannot be distinguished from free space. [@contact-table] has "
+        "the window of each number."
     )
     alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
     panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))

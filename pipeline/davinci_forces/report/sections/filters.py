@@ -95,7 +95,7 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
         "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
         "delays, over the smoother's. Alarm level: free motion like that of the joint's logs crosses it at most "
-        "once in ten minutes. Contacts found: the number of the joint's measured contacts that exceed it."
+        "once in ten minutes. Contacts found: the number of contacts in all of the joint's logs that exceed it."
     )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(caption, header, rows, "stream", "llrrrrrr")

@@ -121,14 +121,12 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     table_rows = tuple(parameter_row(context, fit, i, f"$theta_{n}$", f" of {joint}") for n, i in enumerate(rows, 1))
     coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
-    whose = ""
-    if fit.group != joint:
-        whose = " of all joints, each in its unit squared"
-        mse = mse.text if isinstance(mse, Number) else mse
+    error = (
+        f" Mean squared error of the effort: {mse}." if fit.group == joint else ""
+    )  # else of joints of several units
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
-        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}. "
-        f"Mean squared error of the effort{whose}: {mse}.{scales(context, joint, fit)}{coupled}"
+        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}.{error}{scales(context, joint, fit)}{coupled}"
     )
     return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
 

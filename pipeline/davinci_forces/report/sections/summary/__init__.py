@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Stiffness, Track
+from davinci_forces.records import Contact, Stiffness, Threshold, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
@@ -22,6 +22,7 @@ WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
 TOUCHED: Colour = "sky"  # of contact windows
 REST: Colour = "yellow"  # of standstill
 MAX_IN_COLUMN = 3  # panels below each other on page one
+MAX_PEAKS = 6  # contacts of which page one states each peak
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -72,8 +73,10 @@ def rule_in_words(trusts: list[Trust]) -> str:
     by_level = "detection level over the effort sought"
     by_error = "model error over effort"
     rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
-    worst = "A joint's verdict is that of its worst log among those that no fit used, if there are any."
-    return f"{worst} It follows from {rule}, by [@thresholds]."
+    text = f"The verdict follows from {rule}, by [@thresholds]."
+    least = percent(verdicts.COVERED[0])
+    narrow = f" “Narrow band” is good by it, but the 95 % band covers less than {least} of free-space samples."
+    return text + narrow * any(trust.narrow and trust.level == "good" for trust in trusts)
 
 
 def caption(contacts: list[Contact], panels: list[Panel]) -> str:
@@ -108,23 +111,24 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     unstated = sum(len(contact) for contact in contacts) - stated
     found = f"{count(unstated, 'contact')} found above"
     text = (
-        f"External effort is what the robot exerts on its environment: {efforts_in_words(context)}. It was estimated "
-        f"on {count(len(joints), 'joint')} of the {literal(context.study.robot.title)}, in {len(logs)} of "
-        f"{count(len(context.study.logs), 'log')}.{opening.currents_in_words(context)}"
+        f"External effort is what the robot exerts on its environment, the opposite of a push on it: "
+        f"{efforts_in_words(context)}. It was estimated on {count(len(joints), 'joint')} of the "
+        f"{literal(context.study.robot.title)}, in {len(logs)} of {count(len(context.study.logs), 'log')}."
+        f"{opening.currents_in_words(context)}"
     )
     if not contacts:
         roles = {log.role for log in context.study.logs}
         why = "pushes are in [@tissue]" if context.catalogue.records(Stiffness) else "no log has the role contact"
         if "contact" in roles:
-            why = "none was found, and the study states none"
+            why = "none was found, and the study states no window of contact"
         return f"{text} No contact is measured: {why}."
-    peaks = largest_peaks(context, contacts)
+    peaks = peaks_in_words(context, contacts)
     if not stated:
         doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
         small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
         doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
         level = "the alarm level, which free motion crosses at most once in ten minutes"
-        text = f"{text} **{found} {level}; the study states none.{peaks}**"
+        text = f"{text} **{found} {level}; the study states no window of contact.{peaks}**"
         return f"{text}{doubt}" if small else text
     outside = f" Outside the stated windows, {found} the alarm level." if unstated else ""
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
@@ -133,21 +137,35 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
 
 
-def largest_peaks(context: Context, contacts: list[Contact]) -> str:
-    """State the largest peak of each joint with its standard error, and the log."""
-    joints: dict[str, list[tuple[float, str, int, float]]] = {}
-    for contact in (contact for contact in contacts if contact.above.any()):
-        row = int(np.argmax(np.abs(contact.peak) * contact.above))
-        joints.setdefault(contact.joint, []).append((abs(contact.peak[row]), contact.log, row + 1, contact.onset[row]))
-    largest = {joint: max(peaks) for joint, peaks in joints.items()}
-    logs = {log for _, log, _, _ in largest.values()}
-    named = f" in {literal(*logs)}" if len(logs) == 1 < len(largest) else ""  # once for all
+def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
+    """State the peaks with their standard errors, logs and times: all if they are few, else the largest of each joint.
+
+    Then name the joints of contact logs without any, and the level below which a contact is missed.
+    """
+    above = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
+    touched = {contact.joint for contact, _ in above}
+    is_short = len(above) <= MAX_PEAKS
+    if not is_short:
+        by_size = sorted(above, key=lambda of: abs(of[0].peak[of[1]]))
+        largest = {contact.joint: (contact, row) for contact, row in by_size}
+        above = [largest[joint] for joint in dict.fromkeys(contact.joint for contact in contacts) if joint in largest]
+    logs = {contact.log for contact, _ in above}
+    named = f" in {literal(*logs)}" if len(logs) == 1 < len(above) else ""  # once for all
     peaks = [
-        f"{context.number(f'contact.{log}.{joint}.{number}.peak', 3)} on {name_in_sentence(joint)} "
-        f"({'' if named else f'{literal(log)}, '}from {onset:.1f} s)"
-        for joint, (_, log, number, onset) in largest.items()
+        f"{context.number(f'contact.{of.log}.{of.joint}.{row + 1}.peak', 3)} on {name_in_sentence(of.joint)} "
+        f"({'' if named else f'{literal(of.log)}, '}{of.onset[row]:.1f} to {of.release[row]:.1f} s)"
+        for of, row in above
     ]
-    return f" Largest{named}: {as_list(peaks)}." if peaks else ""
+    text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
+    sought = {
+        track.joint for track in context.catalogue.records(Track) if context.study.log(track.log).role == "contact"
+    }
+    levels = [
+        f"{name_in_sentence(t.joint)} above {context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)}"
+        for t in context.catalogue.records(Threshold)
+        if t.joint in sought - touched
+    ]
+    return f"{text} None on {as_list(levels)}." if peaks and levels else text
 
 
 def efforts_in_words(context: Context) -> str:
@@ -217,13 +235,13 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Coverage",
     )  # fmt: skip
     caption = (
-        "Trust in the estimates. Each row is of the joint's worst logs: New path to Ceiling of that with the largest "
-        "model error, Detection level of that with the highest level, Coverage of that with the lowest. New path: "
-        "share of the run's motion that is unlike any fitted path; above 10 %, it tests the model. Model error: RMS "
-        "of measured minus modelled effort, both low-passed, without noise. Relative error: model error over the RMS "
-        "of the measured effort; $R^2$ includes the noise. Ceiling: largest $R^2$ that noise allows. Detection level: "
-        "99 % of free-space samples are lower. Coverage: share of free-space samples in the stated 95 % error band. ± "
-        "is one standard error."
+        "Trust in the estimates. Each row is of the joint's worst logs among those that no fit used, if there are any: "
+        "New path to Ceiling of that with the largest model error, Detection level of that with the highest level, "
+        "Coverage of that with the lowest. New path: share of the run's motion that is unlike any fitted path; above "
+        "10 %, it tests the model. Model error: RMS of measured minus modelled effort, both low-passed, without noise. "
+        "Relative error: model error over the RMS of the measured effort; $R^2$ includes the noise. Ceiling: largest "
+        "$R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: share of free-space "
+        "samples in the stated 95 % error band. ± is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))

@@ -14,8 +14,8 @@ from davinci_forces.report.sections.parts import grade_of_mass, of_joint
 from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 
 SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
-# In a warning of any stage that blames units, or leaves a joint without an answer.
-COMES_FIRST = re.compile(r"check the units|its external effort is not estimated")
+# In a warning of any stage that blames units, or leaves a joint without an answer, or free motion in doubt.
+COMES_FIRST = re.compile(r"check the units|its external effort is not estimated|something seems to touch the arm")
 LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
@@ -152,7 +152,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         space = trusted.narrowest
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
-            covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it."
+            covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
+            covers += "until then, judge an effort by the detection level."
         weight = min(1.0 + 10 * (verdicts.COVERED[0] - space.coverage), MAX_NARROW)
         yield weight, f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 

@@ -5,12 +5,12 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.records import Stiffness, TipContact, Weight
+from davinci_forces.records import Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
-from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, percent, stiffness_level
+from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
 MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
@@ -21,15 +21,16 @@ TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   �
 
 def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that stand out, and what limits the others."""
-    fine = [trusted for trusted in trusts if trusted.level == "good" and not trusted.narrow]
+    fine = [trusted for trusted in trusts if trusted.level == "good"]
     levels = [
-        f"above {context.size(t.space, 'detection_level', t.space.detection_level)} on {name_in_sentence(t.joint)}"
+        f"above {context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)} on {name_in_sentence(t.joint)}"
+        + " (whose 95 % band is too narrow)" * t.narrow
         for t in fine
         if t.space is not None
     ]
     parts = [f"efforts {as_list(levels)} stand out from free motion"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
-    narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `errors` names the good
+    narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `levels` names the good
     unseen = [t for t in trusts if t.space is None]
     for why, some in (("the 95 % band is too narrow", narrow), ("no effort was estimated in free space", unseen)):
         names = [name_in_sentence(t.joint).removeprefix("the " if i else "") for i, t in enumerate(some)]
@@ -38,7 +39,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     roles = {trusted.space.role for trusted in trusts if trusted.space is not None}
     if roles and not any(trusted.narrow for trusted in trusts):
         where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
-        parts += [f"{where} all 95 % bands are wide enough"]
+        parts += [f"{where} the 95 % band of each joint is wide enough"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -50,15 +51,13 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
         name = name_in_sentence(trusted.joint)
         path = "the fitted path" if trusted.same_path else "an unseen path"
         level, error = trusted.level, f"{percent(trusted.share)} on {name}"
-        narrow = "narrow" if level == "good" else ""
         if trusted.fineness > DETECTABLE:
             level, error = "bad", f"{error}, whose detection level is above the effort sought"
-        kinds.setdefault((path, "too much to be believed" if level == "bad" else narrow), []).append(error)
+        kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
     for (path, why), joints in kinds.items():
         whose = "its" if len(joints) == 1 else "their"
         caution = f"so judge {whose} efforts with caution"
-        follows = f"but {whose} band is too narrow" if why == "narrow" else why or caution
-        yield f"on {path} the model errs by {as_list(joints)}, {follows}"
+        yield f"on {path} the model errs by {as_list(joints)}, {why or caution}"
 
 
 def measurements(context: Context) -> tuple[str, ...]:
@@ -72,7 +71,10 @@ def forces_at_tip(context: Context) -> Iterator[str]:
     """The largest force at the tip in the contacts of each log, with its standard error."""
     for contact in context.catalogue.records(TipContact):
         largest = context.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
-        yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched"
+        [force] = context.catalogue.select(TipForce, log=contact.log)
+        narrow = f"; its 95 % band covers only {percent(force.force_coverage)} of free space"
+        beside = narrow if band(force.force_coverage) == "bad" else ""
+        yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched{beside}"
 
 
 def masses(context: Context) -> Iterator[str]:
@@ -108,7 +110,9 @@ def currents_in_words(context: Context) -> str:
     ]
     is_listed = any(joint.name not in context.study.changed for joint in context.study.joints_by_current)
     whose = " (by the robot’s description: check your drives)" if is_listed else ""
-    return f" 1 A of a motor counts as {'; '.join(factors)}{whose}." if factors else ""
+    tested = any(np.isfinite(weight.stated_mass) for weight in context.catalogue.records(Weight))
+    untested = "" if tested else "; no known mass tests that, and all efforts scale with it"
+    return f" 1 A of a motor counts as {'; '.join(factors)}{whose}{untested}." if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
