@@ -17,6 +17,7 @@ MAX_STEPS = 4  # largest number of steps between the numbers of an axis
 CURVE_WIDTH, PLACE_SIZE = 1.4, 4.0  # [pt]
 AROUND = 1.1  # size of the cube over the largest range of the marks
 NUMBER_GAP, LABEL_GAP = 11.0, 30.0  # [pt] from an edge of the cube to its numbers and its label
+HALF_LETTER = 0.35  # half the width of a letter and the space around it, over its size
 HEAD, HALF_ANGLE = 4.0, 0.45  # [pt], [rad] length and half the angle of the head of an arrow
 AZIMUTH, ELEVATION = radians(-60.0), radians(20.0)  # of the reader
 SCREEN = np.array(  # (2, 3) directions to the right and up
@@ -84,9 +85,12 @@ def draw_axis(view: View, axis: int) -> str:
     outwards, direction = SCREEN @ edge, SCREEN @ along
     outwards -= direction * (outwards @ direction) / (direction @ direction)
     outwards /= np.linalg.norm(outwards)
-    for share, number in zip(shares, in_digits(values, step), strict=True):
+    numbers = in_digits(values, step)
+    for share, number in zip(shares, numbers, strict=True):
         svg += _words(view, edge + share, NUMBER_GAP * outwards, number, SMALL_SIZE)
-    return svg + _words(view, edge, LABEL_GAP * outwards, LABELS[axis], NORMAL_SIZE)
+    # Beside an upright edge, the label stands off by half of its own width and of the longest number's.
+    wide = abs(outwards[0]) * HALF_LETTER * (SMALL_SIZE * max(map(len, numbers)) + NORMAL_SIZE * len(LABELS[axis]))
+    return svg + _words(view, edge, max(LABEL_GAP, NUMBER_GAP + wide) * outwards, LABELS[axis], NORMAL_SIZE)
 
 
 def _segment(view: View, point: Array, axis: int) -> str:

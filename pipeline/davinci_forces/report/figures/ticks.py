@@ -43,7 +43,7 @@ class Axis:
             return self._with_decades()
         exponent = power_of_ten(max(abs(self.low), abs(self.high)))
         scale = 10.0**exponent
-        most = min(most, max(int(self.high - self.low), 1)) if self.whole else most
+        most = min(most, max(math.ceil(self.high - self.low), 1)) if self.whole else most
         for intervals in range(most, 0, -1):
             values, step = round_values(self.low / scale, self.high / scale, intervals)
             texts = in_digits(values, step)

@@ -185,7 +185,12 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
     by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
     logs = [log for log in by_error if len(touched[log]) == 1] or by_error
-    logs = logs or ([trusted.space.log] if trusted.space is not None else [])
+    untouched = [
+        t.log
+        for t in context.catalogue.select(Track, joint=trusted.joint)
+        if context.study.log(t.log).role == "contact"
+    ]
+    logs = logs or untouched[:1] or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         stated = parts.spans(context.study.log(track.log).contact, colour=TOUCHED)
         sizes = [trusted.space.free_level] if trusted.space is not None else []
