@@ -12,6 +12,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, presliding_friction, smooth_sign, stribeck
 from davinci_forces.records import Fit
+from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.models import coupled_arm, independent
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import Study
@@ -102,7 +103,7 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
             model = independent(joint, [*terms, *ADDED])
         fit = fit_of(model, structure, possible(model, 0 if structure == "coupled" else number))
         joints.append(ExportedJoint(joint.name, joint, fit, model, valid, online))
-    return Export(study, None, None, tuple(joints), ORIGIN)
+    return Export(study, Catalogue(lambda kind: ()), None, tuple(joints), ORIGIN)
 
 
 def motion_of(joint: ExportedJoint, moved: ArmMotion) -> ArmMotion:

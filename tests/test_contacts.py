@@ -328,8 +328,10 @@ def test_free_windows_of_a_contact_log_give_its_levels_and_what_is_between_them_
     assert (smoothed.log, smoothed.free_rms) == ("push", pytest.approx(0.05, rel=0.3))
     inside = ((T >= 3) & (T <= 17)) | ((T >= 26) & (T <= 37))
     assert smoothed.tested == pytest.approx(inside.sum(), abs=4)
-    stated = entry(role="contact", contact=((20.0, 22.0),), free=((2.0, 5.0),))
+    stated = entry(role="contact", contact=((20.0, 22.0),))
     assert stated.possible_contact == stated.contact
+    both = replace(stated, free=((2.0, 18.0), (25.0, 38.0)))
+    assert both.possible_contact == replace(both, contact=()).possible_contact
     assert entry(role="validation", free=((2.0, 5.0),)).possible_contact == ()
 
 
@@ -599,6 +601,19 @@ def test_a_touch_in_a_log_of_free_motion_is_named_and_free_motion_is_not():
     assert len(list(assess.run(track(slow_noise(0.05) + push, role="validation", dq=MOVING), stated, arm.ARM))) == 2
 
 
+@pytest.mark.parametrize(
+    ("free", "remedy"),
+    [((), "add this time to its contact windows, or state in its free windows"),
+     (((2.0, 25.0),), "leave this time out of its free windows"), (((2.0, 18.0), (24.0, 36.0)), "")],
+)  # fmt: skip
+def test_a_touch_outside_the_windows_of_a_contact_log_is_named_unless_free_leaves_it_out(free, remedy):
+    touched = slow_noise(0.05) + np.where((T >= 20) & (T <= 22), 2.0, 0.0) + np.where((T >= 30) & (T <= 32), 3.0, 0.0)
+    contact = ((29.5, 32.5),) if not free or len(free) == 1 else ((20.0, 22.0),)
+    about = entry(role="contact", contact=contact, free=free if len(free) < 2 else ((2.0, 18.0), (34.0, 38.0)))
+    _, _, *warnings = assess.run(track(touched, dq=MOVING), about, arm.ARM)
+    assert [remedy in warning.text[0] for warning in warnings] == [True] * bool(remedy)
+
+
 def test_friction_of_a_joint_that_slows_down_to_a_stop_is_no_touch():
     push = np.where((T >= 20) & (T <= 20.5), 2.0, 0.0)
     stops = np.interp(T, [0.0, 19.9, 20.0, 20.4, 20.5, 40.0], [1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
@@ -611,7 +626,7 @@ def test_friction_of_a_joint_that_slows_down_to_a_stop_is_no_touch():
 def test_what_is_three_times_above_the_level_of_the_rest_of_a_log_is_a_touch(monkeypatch, size, touches):
     monkeypatch.setattr(assess, "typical_alarm_level", lambda *given: 0.1)
     effort = np.where(np.arange(len(T)) == 2000, 0.1 * size, 0.0)
-    warnings = assess.touch_warning(track(effort, dq=MOVING), np.ones(len(T), bool), arm.ARM)
+    warnings = assess.touch_warning(track(effort, dq=MOVING), np.ones(len(T), bool), entry(), arm.ARM)
     assert ["at 20.00 s" in warning.text[0] for warning in warnings] == [True] * touches
 
 
@@ -619,7 +634,7 @@ def test_an_effort_at_standstill_is_no_touch_however_small_efforts_are(monkeypat
     monkeypatch.setattr(assess, "typical_alarm_level", lambda *given: 1e-4)
     still = np.where(np.arange(len(T)) < 1000, 0.0, MOVING)
     effort = np.where(np.arange(len(T)) == 500, 1.0, 2e-4)
-    assert not [*assess.touch_warning(track(effort, dq=still), np.ones(len(T), bool), arm.ARM)]
+    assert not [*assess.touch_warning(track(effort, dq=still), np.ones(len(T), bool), entry(), arm.ARM)]
 
 
 @pytest.mark.parametrize(("samples", "levels"), [(99, 0), (100, 1)])

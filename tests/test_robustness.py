@@ -547,15 +547,19 @@ def test_verify_compares_a_file_with_what_every_task_knew_of_it(finished):
     assert "for report report" in line
 
 
-def remarked(damage, q_limits=(-0.6, 0.6)) -> str:
+def remarked(damage) -> str:
     """What is said of a recording of the roll after something was done to it."""
+    return " ".join(text for record in diagnosed(damage) for text in record.text)
+
+
+def diagnosed(damage) -> list[Diagnostic]:
     signal = arm.signal("hand_roll", rate=100.0, periods=2)
     columns = {"t": signal.t, "q": signal.q.copy(), "dq": signal.dq.copy(), "tau": signal.tau.copy()}
     damage(columns)
     filled = np.zeros(len(columns["t"]), int)
     recording = Recording("run", "hand_roll", "identification", 100.0, "logged", **columns, filled=filled)
     made = resample.run(recording, arm.joint("hand_roll"), lowpass=17.0)
-    return " ".join(text for record in made if isinstance(record, Diagnostic) for text in record.text)
+    return [record for record in made if isinstance(record, Diagnostic)]
 
 
 def stop_sensor(columns):
@@ -587,9 +591,14 @@ def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond
     assert at(1.1) != at(1.9)
     for times in (1.1, 1.9):
         assert (
-            "rad where the robot states -0.6 to 0.6; correct the units, or `limits` in [robot_overrides], by which "
+            "rad where the robot states -0.6 to 0.6; correct the units, or the zero of positions (`offset`), on which "
             in at(times)
         )
+    severities = [
+        [record.severity for record in diagnosed(lambda c, x=times: c.update(q=x / far * c["q"], dq=x / far * c["dq"]))]
+        for times in (1.1, 1.4, 1.6, 1.9)
+    ]
+    assert severities == [[("note",)]] * 2 + [[("warning",)]] * 2  # a quarter of the range is 1.5
     for times in (2.1, 19.0):
         assert "times the limit of 0.6 rad" in at(times)
         assert "positions from" not in at(times)

@@ -491,6 +491,21 @@ def test_a_weight_log_without_a_weight_is_named_with_what_to_write(tmp_path):
         assert not read(tmp_path, GOOD.replace('"identification"', f'"weight"\n{weight}')).remarks
 
 
+@pytest.mark.parametrize(
+    ("constants", "warns"),
+    [("torque_constant = 1.9", True), ("torque_constant = 0.2", False),
+     ("torque_constant = 1.9\ngear_ratio = 1.0", False), ("torque_constant = 1.9\ngear_ratio = 200.0", False),
+     ("gear_ratio = 2000.0", False)],
+)  # fmt: skip
+def test_a_constant_of_the_joint_that_is_geared_again_is_remarked_on(tmp_path, constants, warns):
+    made = read(tmp_path, f"{GOOD}[robot_overrides.hand_roll]\n{constants}\n")
+    lines = [
+        f"{tmp_path / 'study.toml'}:14: 1 A of hand_roll counts as 380 N m: its torque_constant is 43 times the "
+        "robot's, its gear_ratio still 200; if the constant is at the joint, write gear_ratio = 1.0, too"
+    ]
+    assert made.remarks == tuple(lines * warns)
+
+
 HANGS = 'weight = { moves_with = "5", position = [0, 0.1, 0.2] }'
 
 

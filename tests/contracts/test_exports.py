@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,10 +14,11 @@ from davinci_forces import robots
 from davinci_forces.errors import BadRequest, BadRobot
 from davinci_forces.exports import FORMATS, renderer, urdf
 from davinci_forces.exports.identified import SAFETY, export_of
+from davinci_forces.filters import DEFAULT
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import pseudo_inertias
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.records import Choice, JointModel, Motion
+from davinci_forces.records import Choice, FreeSpace, JointModel, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.dvrk_psm import ROBOT as PSM
@@ -46,6 +48,24 @@ def test_every_file_says_where_it_comes_from_and_that_it_is_no_medical_device(na
     assert not any(
         word in text for text in renderer(name)(honest).files.values() for word in ("SIMULATED:", "despite: ")
     )
+
+
+def test_a_band_that_is_too_narrow_is_warned_of_by_logs_that_no_fit_used(small):
+    def warnings(*of_logs):
+        spaces = [SimpleNamespace(joint="hand_roll", log=log, role=role, filter=DEFAULT, coverage=share)
+                  for log, role, share in of_logs]  # fmt: skip
+        catalogue = Catalogue(lambda kind: spaces if kind is FreeSpace else ())
+        return [line for line in replace(small, catalogue=catalogue).remarks() if "+-1.96 std" in line]
+
+    fitted = ("fitted", "identification", 0.5)
+    assert not warnings()
+    assert not warnings(fitted, ("other", "validation", 0.9))
+    told = warnings(fitted, ("other", "validation", 0.95), ("worse", "contact", 0.78))
+    assert told == [
+        "warning: hand_roll: +-1.96 std covers 78 % of its free motion in worse, not 95 %; judge its external effort "
+        "by the alarm level"
+    ]
+    assert "50 %" in warnings(fitted)[0]
 
 
 def test_limits_are_those_of_the_robot_and_null_where_it_states_none():

@@ -52,7 +52,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.content.marks import Line, Points, VSpan
-from davinci_forces.report.context import Context, title
+from davinci_forces.report.context import Context, name_in_sentence, title
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import (
     DOCUMENTS,
@@ -793,9 +793,31 @@ def test_page_one_names_the_log_of_all_panels_and_peaks_once(full: Context):
     assert [panel.title for panel in summary.in_column(other)] == [panel.title for panel in other]
     assert summary.caption(full.catalogue.records(Contact), other).startswith("External effort of each joint. ")
     tip = [contact for contact in full.catalogue.records(Contact) if contact.log == "tip"]
-    assert summary.largest_peaks(full, tip).count("tip") == 1
-    assert summary.largest_peaks(full, tip).startswith(" Largest in tip: ")
-    assert summary.largest_peaks(full, tip[:1]).startswith(" Largest: ")
+    assert summary.peaks_in_words(full, tip).count("tip") == 1
+    assert summary.peaks_in_words(full, tip).startswith(" Contact peaks in tip: ")
+
+
+def test_page_one_states_every_peak_if_they_are_few_and_where_none_is(full: Context, monkeypatch):
+    contacts = full.catalogue.records(Contact)
+    above = [(of, row) for of in contacts for row in np.flatnonzero(of.above)]
+    for most in (len(above), len(above) - 1):
+        monkeypatch.setattr(summary, "MAX_PEAKS", most)
+        text = summary.peaks_in_words(full, contacts)
+        shown = [f"{of.onset[row]:.1f} to {of.release[row]:.1f} s" in text for of, row in above]
+        assert all(shown) == (most == len(above))
+        assert text.startswith(" Contact peaks" if all(shown) else " Largest contact peaks")
+    for joint in dict.fromkeys(of.joint for of, _ in above):
+        [(size, largest)] = sorted(
+            ((abs(of.peak[row]), f"{of.onset[row]:.1f} to") for of, row in above if of.joint == joint)
+        )[-1:]
+        assert size > 0
+        assert largest in text
+    [first, *others] = dict.fromkeys(of.joint for of, _ in above)
+    alone = summary.peaks_in_words(full, [of for of in contacts if of.joint == first])
+    for joint in others:
+        level = full.number(f"threshold.{joint}.alarm_level", 2, std=None)
+        assert f"{name_in_sentence(joint)} above {level}" in alone.partition(" None on ")[2]
+    assert " None on " not in summary.peaks_in_words(full, contacts)
 
 
 def test_where_nothing_is_to_be_looked_at_first_the_next_step_is_said(full: Context):

@@ -19,7 +19,7 @@ from report_documents import HOSTILE, still, zoomable
 
 from davinci_forces.report import writers
 from davinci_forces.report.content import Document, Figure, Figure3D, Panel, walk
-from davinci_forces.report.content.marks import Histogram, Line, Points, Tiles
+from davinci_forces.report.content.marks import Histogram, Line, Line3D, Points, Tiles
 from davinci_forces.report.figures.palette import COLOURS
 from davinci_forces.report.figures.panels import wrap_label
 from davinci_forces.report.figures.svg import svg
@@ -138,6 +138,18 @@ def test_an_axis_that_counts_has_whole_numbers_and_one_with_a_unit_does_not() ->
         ([0.0, 0.5], "share", ("0.0", "0.1", "0.2", "0.3", "0.4", "0.5")),
     ):  # fmt: skip
         assert axis_over([np.array(values)], (0.0, 0.0), False, label).with_numbers(5).texts == texts
+    assert axis_over([np.array([1.0, 3.0])], (0.05, 0.05), False, "window").with_numbers(5).texts == ("1", "2", "3")
+
+
+def test_the_label_of_an_upright_axis_in_space_stands_off_its_numbers() -> None:
+    x, y, z = np.array([[0.0, 0.1], [0.0, 0.2], [-0.2, 0.0]])
+    picture = svg(Figure3D("", "", (Line3D(x, y, z, "", "grey", "solid"),), "space", height=88))
+    [label] = [one for one in words_of(picture) if one.text == "z [m]"]
+    numbers = [one for one in words_of(picture) if one.text[-1].isdigit()]
+    assert numbers
+    assert not any(
+        abs(one.top - label.top) < 8 and one.left < label.right and label.left < one.right for one in numbers
+    )
 
 
 @pytest.mark.parametrize(

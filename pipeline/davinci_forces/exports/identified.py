@@ -21,9 +21,10 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
-from davinci_forces.maths.uncertainty.error_band import MIN_COVERAGE, NORMAL_95, calibrate
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95, calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.records.forces import MIN_COVERAGE
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.robot import Joint
 from davinci_forces.study import Study
@@ -110,7 +111,7 @@ class Export:
             spaces = free_spaces(self.catalogue, joint.name)
             narrowest = min(spaces, key=lambda space: space.coverage, default=None)
             if narrowest is not None and narrowest.coverage < MIN_COVERAGE:
-                covers = f"+-1.96 std covers {narrowest.coverage:.0%} of its free motion in {narrowest.log}"
+                covers = f"+-1.96 std covers {100 * narrowest.coverage:.0f} % of its free motion in {narrowest.log}"
                 yield f"warning: {joint.name}: {covers}, not 95 %; judge its external effort by the alarm level"
 
     def remarks(self) -> list[str]:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.special import bdtr
 
 from davinci_forces.maths.arrays import Booleans
-from davinci_forces.maths.uncertainty.error_band import MIN_COVERAGE, NORMAL_95
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
+from davinci_forces.records.forces import MIN_COVERAGE
 from davinci_forces.records.weight import TorqueConstant, Weight
 from davinci_forces.report.content import Cell, Level
 

@@ -32,7 +32,6 @@ DETECTED_SHARE = 0.99  # share of free-space samples below the detection level
 TYPICAL_SHARE = 0.95  # share of free-space samples below the lower level
 TINY = 1e-12  # size of an error of 0, so that it has a logarithm
 NORMAL_95 = 1.959963984540054
-MIN_COVERAGE = 0.9  # share of free-space samples that a 95 % band covers if it is not too narrow
 MIN_SAMPLES_QUARTILES = 100
 MAX_SAMPLES_BOOTSTRAP = 20_000  # of more samples, evenly spaced ones are drawn
 MIN_DRIFT_ERRORS = 2.0  # a day offset that differs by more standard errors between the halves of a log drifts
