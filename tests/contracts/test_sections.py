@@ -297,15 +297,16 @@ def trusts(full: Context, **shares: float) -> list[Trust]:
 
 def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Context):
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
+    level = full.number("threshold.hand_roll.alarm_level", 2, std=None)
     assert said == (
-        "Efforts above 0.070 on the hand roll stand out from free motion; on an unseen path the model errs by 16 % on "
-        "the hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the instrument "
-        "slide, too much to be believed; in free motion all 95 % bands are wide enough."
+        f"Efforts above {level} on the hand roll stand out from free motion; on an unseen path the model errs by 16 % "
+        "on the hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the "
+        "instrument slide, too much to be believed; in free motion the 95 % band of each joint is wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
     said = opening.verdict_sentence(full, [narrow])
-    assert said == "On an unseen path the model errs by 5 % on the hand roll, but its band is too narrow."
+    assert said == f"Efforts above {level} on the hand roll (whose 95 % band is too narrow) stand out from free motion."
 
 
 def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):
@@ -612,7 +613,7 @@ def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Con
     contacts = [replace(contact, joint=joint) for joint in ("instrument_slide", "hand_pitch", "hand_roll")]
     order = ["Hand roll", "Hand pitch", "Instrument slide"]
     assert [panel.title for panel in contacts_section.peaks(full, contacts).panels] == order
-    levels = contacts_section.alarm_levels(full, contacts)
+    levels = contacts_section.alarm_levels(full)
     assert sorted(order, key=lambda joint: levels.index(joint.lower())) == order
 
 
@@ -621,13 +622,16 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     about = context(lab, catalogue)
     said = summary.opening_paragraph(about, found)
     level = "above the alarm level, which free motion crosses at most once in ten minutes"
-    assert f"**{sum(map(len, found))} contacts found {level}; the study states none. Largest" in said
+    assert f"**{sum(map(len, found))} contacts found {level}; the study states no window of contact." in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
     windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
     assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, ones)
     about = context(lab, without(catalogue, Contact))
-    assert "No contact is measured: none was found, and the study states none." in summary.opening_paragraph(about, [])
+    assert (
+        "No contact is measured: none was found, and the study states no window of contact."
+        in summary.opening_paragraph(about, [])
+    )
     logs = tuple(log for log in about.study.logs if log.role != "contact")
     only_tissue = replace(about, study=replace(about.study, logs=logs))
     assert "No contact is measured: pushes are in [@tissue]." in summary.opening_paragraph(only_tissue, [])
@@ -646,7 +650,7 @@ def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, ca
     for about, doubted in ((known, False), (unknown, True)):
         assert (doubt in summary.opening_paragraph(about, found)) == doubted
         notes = [block.text for block in walk(written("contacts", about)) if isinstance(block, Prose)]
-        assert any("State windows without contact, `free = " in note for note in notes) == doubted
+        assert any("State windows in which nothing touched the arm, `free = " in note for note in notes) == doubted
 
 
 def test_a_joint_without_efforts_is_not_counted_and_not_sent_to_record_what_it_has(lab: Lab, catalogue: Catalogue):
