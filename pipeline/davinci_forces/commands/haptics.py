@@ -56,6 +56,11 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     from davinci_forces.haptics import limits
     from davinci_forces.haptics import loop as haptic
 
+    if not haptic.is_followed(scenario):
+        raise BadRequest(
+            f"{scenario.title}: the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so "
+            "it follows no hand; state another [arm.body], or another [arm.control]"
+        )
     response, loop = haptic.response(scenario), limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:

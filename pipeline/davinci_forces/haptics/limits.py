@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles
+from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles, is_followed
 from davinci_forces.haptics.maths import delay as delays
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import Complex
@@ -125,7 +125,8 @@ def measured_limit(
     """The fields of `HandLimit` that follow from the formula and the filter: the limit, its error, and their reasons.
 
     The error is that of the filter's response in the recordings and that of the arm's parameters, by the limits of the
-    `changed` scenarios.  Without recordings the filter is the simulated one.
+    `changed` scenarios; it is unknown if the arm follows no hand in one of them.  Without recordings the filter is the
+    simulated one.
     For a hand without limit, w is NaN, and its own frequency is taken.
     """
     w = w if math.isfinite(w) else hand.frequency
@@ -142,7 +143,10 @@ def measured_limit(
 
     headline = limit(H * unfiltered, Z)
     errors = [limit((H + part) * unfiltered, Z) - headline for part in (std, 1j * std) if known]
-    errors += [limit(*gain_and_impedance(scenario, f)) - limit(G, Z) for scenario in changed]
+    errors += [
+        limit(*gain_and_impedance(scenario, f)) - limit(G, Z) if is_followed(scenario) else math.nan
+        for scenario in changed
+    ]
     return {
         "k_t_limit": headline, "k_t_limit_std": math.hypot(*errors) if errors else math.nan, "limit_frequency": f,
         "filter_lag": -float(np.angle(H)) / w, "filter_lag_std": std / abs(H) / w, "filter_share": abs(H),

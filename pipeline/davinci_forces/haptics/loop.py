@@ -32,6 +32,7 @@ SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visi
 FREQUENCIES = np.geomspace(0.2, 30.0, 33)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
 MAX_SPEED = 0.6  # [m/s] of that motion; at 0.8 m/s the default motor reaches its voltage
+FOLLOWED = (0.5, 2.0)  # felt stiffness over true stiffness at the lowest frequency, of an arm that follows the hand
 TRANSIENT, MIN_WATCH = 2.0, 2.0  # [s] initial time that is not evaluated, and least evaluated time
 
 
@@ -93,6 +94,11 @@ def hand_settles(scenario: FullScenario, hand: Hand) -> bool:
 def response(scenario: FullScenario) -> FeltResponse:
     """Compute the response of the felt force to a hand that moves in the tissue, without noise."""
     return FeltResponse(FREQUENCIES, np.array([felt_share(scenario, f) for f in FREQUENCIES.tolist()]))
+
+
+def is_followed(scenario: FullScenario) -> bool:
+    """Whether the arm follows a slow hand; one that its controller does not stabilise does not."""
+    return FOLLOWED[0] < abs(felt_share(scenario, float(FREQUENCIES[0]))) < FOLLOWED[1]
 
 
 def felt_share(scenario: FullScenario, frequency: float) -> complex:

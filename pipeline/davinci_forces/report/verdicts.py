@@ -160,7 +160,8 @@ def is_minority(tissue: Stiffness) -> bool:
 def mass_level(weight: Weight, constants: Sequence[TorqueConstant]) -> tuple[Level, str]:
     """Grade a mass, and say why; good needs the side, agreeing joints, and a narrow interval with the stated mass.
 
-    A mass does not test torque constants that its own log gave: `constants` are those of all logs.
+    A mass does not test torque constants that its own log gave: `constants` are those of the joints of which the
+    study states one.
     """
     if weight.side == "the other one":
         return "warn", "side"

@@ -15,7 +15,7 @@ WORDS = {
     r"|unloaded|empty|tare|0 ?k?g",
     "free": r"(no|without) ?(contact|touch)|free|in air|frei|ohne kontakt",
     "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g|gewicht\w*",
-    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe",
+    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe|silicone?|gelatine?|foam|sponge|rubber",
     "contact": r"contacts?|touch\w*|push\w*|pull\w*|pok\w*|press\w*|collisions?|collid\w*|hits?|with ?force|kontakt\w*"
     r"|stoss|kollision",
     "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",

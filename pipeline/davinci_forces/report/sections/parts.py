@@ -80,8 +80,10 @@ def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int 
 
 
 def grade_of_mass(context: Context, weight: Weight) -> tuple[Level, str]:
-    """The verdict on the mass of a weight log, and why, with the torque constants that known masses gave."""
-    return mass_level(weight, context.catalogue.records(TorqueConstant))
+    """The verdict on the mass of a weight log, and why; a torque constant that the study states may be of that log."""
+    constants = context.catalogue.records(TorqueConstant)
+    stated = [c for c in constants if "torque_constant" in context.study.changed.get(c.joint, {})]
+    return mass_level(weight, stated)
 
 
 def trust(context: Context, joint: str) -> Trust:

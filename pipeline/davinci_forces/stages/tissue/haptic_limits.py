@@ -17,6 +17,7 @@ from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import COULOMB, VISCOUS
 from davinci_forces.records.forces import Comparison, FilterNoise
 from davinci_forces.records.model import Fit
+from davinci_forces.records.record import Diagnostic, diagnostic
 from davinci_forces.records.tissue import HandLimit, HapticMotion, HapticResponse, HapticRun, StabilityLimit, Stiffness
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import HapticScenario
@@ -30,7 +31,7 @@ FROM_FILE, FROM_THESIS = "the scenario", "the thesis"
 def run(
     stiffnesses: Iterable[Stiffness], comparisons: Iterable[Comparison], fits: Iterable[Fit],
     noises: Iterable[FilterNoise], haptics: HapticScenario, robot: Robot, *, q_tau: float,
-) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun]:  # fmt: skip
+) -> Iterator[StabilityLimit | HapticMotion | HandLimit | HapticResponse | HapticRun | Diagnostic]:  # fmt: skip
     """Compute the thesis's criteria; simulate the experiment of section 8.4 on the stiffest tissue, and its limits."""
     tissues = [tissue.stiffness for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
@@ -50,12 +51,23 @@ def run(
         q_tau or (joint.q_tau if joint else 0.0),
         tuned.delay if tuned else haptics.filter_delay,
     )
+    if not haptic.is_followed(scenario):
+        yield not_followed(scenario, arm_from)
+        return
     answer, loop = haptic.response(scenario), limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
         yield limits.limits_of(scenario, name, hand, loop, recordings, () if haptics.body else bodies[1:])
         yield haptic.experiment(scenario, name, hand)
+
+
+def not_followed(scenario: FullScenario, arm_from: str) -> Diagnostic:
+    """Warn that the simulated arm is unstable by itself, as with an inertia that the logs hardly determine."""
+    text = f"arm: its simulated controller does not stabilise {scenario.body.inertia:.2g} kg, the inertia of {arm_from}"
+    remedy = "record a faster motion if that is too small, or state [arm.body] in the file that `haptics` names"
+    message = f"{text}, so no limit of haptic feedback is computed; {remedy}"
+    return diagnostic("haptic-limits", "arm.followed", "warning", message)
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
