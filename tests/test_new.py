@@ -451,14 +451,21 @@ WORDS_OF_ROLES = {
     "contact": ("pull_test", "with_force", "Kontakt", "stoss2", "poke3", "TouchTip", "collision"),
     "weight": ("hang_100g", "load100", "Gewicht", "payload0p25kg"),
     "friction": ("constVel", "friction_map"),
+    "tissue": ("slide_silicone", "foam block 2", "PalpationA", "gelatin"),
 }
 
 
 def test_words_of_several_laboratories_tell_the_role():
     for role, names in WORDS_OF_ROLES.items():
         for name in names:
-            [said] = roles_of([Evidence(name, name, Holding())])
+            [said] = roles_of([Evidence(name, name, Holding(), slides=True)])
             assert said.role == role, name
+
+
+def test_the_word_that_tells_an_excitation_is_quoted_as_it_stands(tmp_path):
+    t, q, dq = motion(4)
+    new(table(tmp_path / "exc_1.csv", t, q, dq, effort(q, dq)))
+    assert 'role = "identification"  # "exc" in its name' in (tmp_path / "study.toml").read_text()
 
 
 def test_where_nothing_repeats_all_logs_but_the_one_that_tests_are_identified_from(tmp_path):

@@ -400,6 +400,11 @@ def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_sp
         guide.page(topic)
 
 
+def test_a_topic_that_is_a_notebook_names_its_file():
+    with pytest.raises(BadRequest, match=r"from-arrays is a notebook; open .*from-arrays\.ipynb in Jupyter"):
+        guide.page("from-arrays")
+
+
 def test_a_term_of_two_words_needs_no_quotes():
     shown = CliRunner().invoke(app, ["guide", "detection", "level"])
     assert (shown.exit_code, "detection level: " in shown.output) == (0, True)

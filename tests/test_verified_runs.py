@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from davinci_forces.runner import reporting
 from tests.test_runs import call, finished, processed, reports  # noqa: F401 - fixtures
 
 pytestmark = pytest.mark.usefixtures("drawn_once")
@@ -28,6 +29,14 @@ def test_verify_names_a_file_in_which_one_byte_was_altered(finished, where, seed
     flip(target, int(rng.integers(target.stat().st_size)))
     said = " ".join(call("verify", finished, code=1).split())
     assert target.name in said
+
+
+def test_a_page_that_differs_is_explained_where_files_were_made_in_another_environment(finished, monkeypatch):  # noqa: F811
+    page, hint = reports(finished) / "report.html", "where numpy was loaded before"
+    page.write_bytes(page.read_bytes().replace(b"Contact", b"Kontakt", 1))
+    assert hint not in " ".join(call("verify", finished, code=1).split())
+    monkeypatch.setattr(reporting, "environment", lambda: "another")
+    assert hint in " ".join(call("verify", finished, code=1).split())
 
 
 def test_a_number_is_traced_to_the_raw_files_on_which_it_rests(finished):  # noqa: F811

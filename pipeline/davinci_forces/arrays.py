@@ -207,7 +207,9 @@ class IdentifiedArm:
         return ExternalEffort(tuple(tracks), tuple(contacts), tuple(self._effort_label(t.joint) for t in tracks), texts)
 
     def save(self, folder: str | Path) -> Path:
-        """Write the logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` makes its report.
+        """Write the identified logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` reports.
+
+        Other logs, such as those of `external_effort`, are added to it like those of any study.
 
         Raises
         ------

@@ -299,14 +299,16 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
     level = full.number("threshold.hand_roll.alarm_level", 2, std=None)
     assert said == (
-        f"Efforts above {level} on the hand roll stand out from free motion; on an unseen path the model errs by 16 % "
-        "on the hand pitch, so judge its efforts with caution; on an unseen path the model errs by 30 % on the "
-        "instrument slide, too much to be believed; in free motion the 95 % band of each joint is wide enough."
+        f"Efforts stand out from free motion above the alarm level of {level} on the hand roll; on an unseen path the "
+        "model errs by 16 % on the hand pitch, so judge its efforts with caution; on an unseen path the model errs by "
+        "30 % on the instrument slide, too much to be believed; in free motion the 95 % band of each joint is wide "
+        "enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
     said = opening.verdict_sentence(full, [narrow])
-    assert said == f"Efforts above {level} on the hand roll (whose 95 % band is too narrow) stand out from free motion."
+    where = f"above the alarm level of {level} on the hand roll (whose 95 % band is too narrow)"
+    assert said == f"Efforts stand out from free motion {where}."
 
 
 def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):
@@ -625,7 +627,7 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     assert f"**{sum(map(len, found))} contacts found {level}; the study states no window of contact." in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
-    windows = f"In {number} of {number} stated windows, the effort exceeds the detection level"
+    windows = f"in {number} of {number}, the effort exceeds the detection level"
     assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, ones)
     about = context(lab, without(catalogue, Contact))
     assert (
@@ -755,7 +757,8 @@ def test_measurements_beyond_those_on_page_one_are_counted(full: Context):
     [measured, *_] = full.catalogue.records(Stiffness)
     weights, many = full.catalogue.records(Weight), [measured] * 6
     catalogue = Catalogue(lambda kind: many if kind is Stiffness else full.catalogue.records(kind))
-    *shown, last = opening.measurements(replace(full, catalogue=catalogue))
+    *shown, last, hands = opening.measurements(replace(full, catalogue=catalogue))
+    assert hands.startswith("Haptic feedback, simulated: stable up to tissue of ")
     assert len(shown) == opening.MAX_MEASURED
     count = len(full.catalogue.records(TipContact)) + len(weights) + len(many)
     assert last.startswith(f"{count - opening.MAX_MEASURED} more logs")

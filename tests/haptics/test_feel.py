@@ -46,6 +46,16 @@ def made(tissues, fits=(), noises=(), scenario=SCENARIO) -> list:
     return [record for record in everything if isinstance(record, HapticResponse | HandLimit | HapticRun)]
 
 
+def test_an_arm_that_follows_no_hand_has_no_limits_and_it_is_said():
+    """The thesis's controller, tuned to 2 kg, does not hold a tenth of it: its loop diverges before any tissue."""
+    body = SLIDE._replace(inertia=0.2, static=(3.0, 3.0), stribeck_velocity=0.01)
+    unstable = replace(SCENARIO, body=body, exact=False)
+    assert made([stiffness()], scenario=unstable) == []
+    *_, said = haptic_limits.run([stiffness()], (), (), (), unstable, davinci.ROBOT, q_tau=0.0)
+    assert "does not stabilise 0.2 kg" in said.text[0]
+    assert "state [arm.body]" in said.text[0]
+
+
 @pytest.fixture(scope="module")
 def records():
     return made([stiffness(k=400.0), stiffness("other", 440.0), stiffness("third", 500.0)])

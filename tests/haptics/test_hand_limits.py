@@ -110,6 +110,8 @@ def test_the_headline_takes_the_filter_from_the_logs_and_its_error_with_it():
     changed = limits.measured_limit(linear, FIRM, 18.6, recordings(3), [heavier])
     assert one["k_t_limit_std"] > 0.0
     assert changed["k_t_limit_std"] > 1.2 * one["k_t_limit_std"]
+    unstable = limits.without_friction(FULL, SLIDE._replace(inertia=0.2))
+    assert np.isnan(limits.measured_limit(linear, FIRM, 18.6, recordings(3), [unstable])["k_t_limit_std"])
 
 
 def test_what_is_felt_without_tissue_adds_to_the_hand():

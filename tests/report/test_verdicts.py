@@ -12,6 +12,7 @@ from davinci_forces.records import PathShare, TorqueConstant, Weight
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report import verdicts
 from davinci_forces.report.context import name_in_sentence
+from davinci_forces.report.sections.parts import grade_of_mass
 from davinci_forces.report.sections.summary import caveats
 from davinci_forces.report.sections.summary.opening import verdict_sentence
 from davinci_forces.report.verdicts import (
@@ -189,6 +190,15 @@ def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, l
 def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, log, why):
     constant = TorqueConstant(log, "lift", 0.5, used, 12.643, 0.17)
     assert mass_level(weight(mass=0.5, mass_std=0.004, stated_mass=0.5), [constant])[1] == why
+
+
+@pytest.mark.parametrize(("changed", "why"), [({}, "right"), ({"lift": {"gear_ratio": 3.0}}, "right"),
+                                             ({"lift": {"torque_constant": 12.6}}, "taken")])  # fmt: skip
+def test_only_a_torque_constant_that_the_study_states_can_be_of_the_mass_s_own_log(changed, why):
+    constant = TorqueConstant("run", "lift", 0.5, 12.6, 12.643, 0.17)
+    catalogue = Catalogue(lambda kind: [constant] if kind is TorqueConstant else [])
+    context = SimpleNamespace(catalogue=catalogue, study=SimpleNamespace(changed=changed))
+    assert grade_of_mass(context, weight(mass=0.5, mass_std=0.004, stated_mass=0.5))[1] == why
 
 
 @pytest.mark.parametrize(("mass", "is_told"), [(0.103, True), (0.1015, False)])

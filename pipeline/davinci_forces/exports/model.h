@@ -6,8 +6,9 @@
  * each filtered and delayed by the cutoff and the lag of the joint that is computed.
  * What a sample holds, for each joint with its own cutoff and lag, which are below:
  *   q            position after the low-pass
- *   dq           central difference of q, or the measured velocity after the same low-pass
- *   ddq          central difference of dq
+ *   dq           central difference of q, or the measured velocity after the same low-pass; 0 where it is below its
+ *                noise, so that its sign is unknown (in logs: the column dq of the record JointModel)
+ *   ddq          central difference of dq, before that
  *   q_measured   position without low-pass
  *   dq_measured  measured velocity without low-pass; if only positions are measured, the central difference of the
  *                position after a low-pass at @LOWPASS@ Hz

@@ -71,6 +71,8 @@ def page(topic: str) -> Page:
     rows = rows or re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text)
     if topic not in by_topic and rows:
         return replace(by_topic[TERMS], write=lambda: "\n\n".join(f"**{term}**:{means}" for term, means in rows))
+    if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file() and topic not in by_topic:
+        raise BadRequest(f"{topic} is a notebook; open {notebook} in Jupyter")
     if topic not in by_topic:
         titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
         times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}

@@ -125,7 +125,7 @@ def measured_limit(
     """The fields of `HandLimit` that follow from the formula and the filter: the limit, its error, and their reasons.
 
     The error is that of the filter's response in the recordings and that of the arm's parameters, by the limits of the
-    `changed` scenarios; it is unknown if the arm follows no hand in one of them.  Without recordings the filter is the
+    `changed` scenarios.  It is unknown if the arm follows no hand in one of them.  Without recordings the filter is the
     simulated one.
     For a hand without limit, w is NaN, and its own frequency is taken.
     """

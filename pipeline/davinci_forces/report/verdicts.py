@@ -267,7 +267,7 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(CAUTION)}, or tested only on the fitted path or mostly at rest", "beyond"),
         ("95 % band of the external effort", "coverage: share of free-space samples in the band",
          f"{percent(COVERED[0])} to {percent(COVERED[1])}",
-         f"above {percent(COVERED[1])} by more than its error: too wide",
+         f"above {percent(COVERED[1])}, and surely above 95 %: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
         ("Stiffness of tissue", "standard error over stiffness",
          f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",

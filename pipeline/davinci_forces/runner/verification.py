@@ -95,6 +95,12 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     if report_id and actual_id != report_id:
         what = f"the report ID of these files is {actual_id or 'unknown'}, not {report_id}"
         problems.append(f"{what}: they are of another report")
+    if problems and not has_same_environment(folders):
+        problems.append(
+            "last digits may differ: some files were made with other packages, on another kind of processor, or in "
+            "Python where numpy was loaded before `davinci_forces.run`; `davinci-forces report --force` makes the "
+            "pages again, and `davinci-forces verify --again` compares all numbers"
+        )
     if problems:
         raise NotReproduced("\n".join(problems))
     count = Counter(name.partition("/")[0] for name in recorded if ledger.digest(name))

@@ -133,8 +133,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     outside = f" Outside the stated windows, {found} the alarm level." if unstated else ""
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
     fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
-    exceeds = f"In {above} of {count(stated, 'stated window')}, the effort exceeds the detection level{fewer}."
-    return f"{text} A window counts once for every joint on which it is measured. **{exceeds}{outside}{peaks}**"
+    each = "counted once for each joint on which they are measured"
+    exceeds = f"Stated windows, {each}: in {above} of {stated}, the effort exceeds the detection level{fewer}."
+    return f"{text} **{exceeds}{outside}{peaks}**"
 
 
 def peaks_in_words(context: Context, contacts: list[Contact]) -> str:

@@ -153,7 +153,7 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
             covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
-            covers += "until then, judge an effort by the detection level."
+            covers += "until then, judge an effort by the alarm level."
         weight = min(1.0 + 10 * (verdicts.COVERED[0] - space.coverage), MAX_NARROW)
         yield weight, f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 

@@ -5,11 +5,11 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.records import Stiffness, TipContact, TipForce, Weight
+from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
-from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
+from davinci_forces.report.sections.parts import RATINGS, grade_of_mass, hand_name
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
@@ -23,12 +23,13 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that stand out, and what limits the others."""
     fine = [trusted for trusted in trusts if trusted.level == "good"]
     levels = [
-        f"above {context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)} on {name_in_sentence(t.joint)}"
+        f"{context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)} on {name_in_sentence(t.joint)}"
         + " (whose 95 % band is too narrow)" * t.narrow
         for t in fine
         if t.space is not None
     ]
-    parts = [f"efforts {as_list(levels)} stand out from free motion"] if levels else []
+    kind = "alarm level" if len(levels) == 1 else "alarm levels"
+    parts = [f"efforts stand out from free motion above the {kind} of {as_list(levels)}"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
     narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `levels` names the good
     unseen = [t for t in trusts if t.space is None]
@@ -64,7 +65,18 @@ def measurements(context: Context) -> tuple[str, ...]:
     """The largest forces at the tip, the masses beside the stated ones, and the stiffnesses, a line each."""
     lines = [*forces_at_tip(context), *masses(context), *stiffnesses(context)]
     more = [f"{count(len(lines) - MAX_MEASURED, 'more log')}: see the contents."] if lines[MAX_MEASURED:] else []
-    return (*lines[:MAX_MEASURED], *more)
+    return (*lines[:MAX_MEASURED], *more, *feedback(context))
+
+
+def feedback(context: Context) -> Iterator[str]:
+    """The stiffest tissue that haptic feedback could render stably to each simulated hand."""
+    limits = [limit for limit in context.catalogue.records(HandLimit) if np.isfinite(limit.k_t_limit)]
+    rendered = [
+        f"{context.number(f'stability.{limit.hand}.k_t_limit', 3)} with hand “{hand_name(context, limit.hand)}”"
+        for limit in limits
+    ]
+    if rendered:
+        yield f"Haptic feedback, simulated: stable up to tissue of {as_list(rendered)}; see [@stability]"
 
 
 def forces_at_tip(context: Context) -> Iterator[str]:
