@@ -758,7 +758,7 @@ def test_measurements_beyond_those_on_page_one_are_counted(full: Context):
     weights, many = full.catalogue.records(Weight), [measured] * 6
     catalogue = Catalogue(lambda kind: many if kind is Stiffness else full.catalogue.records(kind))
     *shown, last, hands = opening.measurements(replace(full, catalogue=catalogue))
-    assert hands.startswith("Haptic feedback, simulated: stable up to tissue of ")
+    assert hands.startswith("Haptic feedback, simulated: stable on tissue up to ")
     assert len(shown) == opening.MAX_MEASURED
     count = len(full.catalogue.records(TipContact)) + len(weights) + len(many)
     assert last.startswith(f"{count - opening.MAX_MEASURED} more logs")

@@ -76,7 +76,7 @@ def feedback(context: Context) -> Iterator[str]:
         for limit in limits
     ]
     if rendered:
-        yield f"Haptic feedback, simulated: stable up to tissue of {as_list(rendered)}; see [@stability]"
+        yield f"Haptic feedback, simulated: stable on tissue up to {as_list(rendered)}"
 
 
 def forces_at_tip(context: Context) -> Iterator[str]:
