@@ -179,7 +179,8 @@ def test_a_folder_that_somebody_else_could_write_to_is_not_used(home, tmp_path, 
 
 
 @pytest.mark.medium
-def test_without_a_home_a_run_and_its_workers_share_a_temporary_folder_that_is_removed(tmp_path):
+def test_without_a_home_a_run_and_its_workers_share_a_temporary_folder_that_is_removed(tmp_path_factory):
+    tmp_path = tmp_path_factory.mktemp("t")  # a short name: the address of a socket in it has at most 107 letters
     user = environment(tmp_path, TMPDIR=str(tmp_path), TEMP=str(tmp_path))
     for name in ("HOME", "LOCALAPPDATA"):
         del user[name]

@@ -198,8 +198,8 @@ def test_a_file_in_place_of_the_processed_folder_is_said(raw, tmp_path):
 @pytest.mark.parametrize(
     ("failure", "says"),
     [
-        (OSError(28, "No space left on device", "x.parquet"), "No space left on device: 'x.parquet'"),
-        (PermissionError(13, "Permission denied", "x.parquet"), "Permission denied: 'x.parquet'"),
+        (OSError(28, "No space left on device", "x.parquet"), "x.parquet: No space left on device"),
+        (PermissionError(13, "Permission denied", "x.parquet"), "x.parquet: Permission denied"),
         (BrokenProcessPool("a child process terminated abruptly"), "run again with fewer --jobs"),
     ],
 )

@@ -83,9 +83,9 @@ def forces_at_tip(context: Context) -> Iterator[str]:
     """The largest force at the tip in the contacts of each log, with its standard error."""
     for contact in context.catalogue.records(TipContact):
         largest = context.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
-        [force] = context.catalogue.select(TipForce, log=contact.log)
-        narrow = f"; its 95 % band covers only {percent(force.force_coverage)} of free space"
-        beside = narrow if band(force.force_coverage) == "bad" else ""
+        coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
+        narrow = [share for share in coverage if band(share) == "bad"]
+        beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
         yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched{beside}"
 
 
