@@ -275,6 +275,8 @@ def test_a_numbered_joint_has_no_article_in_a_sentence():
 def test_bands_are_not_called_right_where_none_was_judged():
     unjudged = replace(trust(error=0.5), space=None)
     assert verdict_sentence(None, [unjudged]) == "No effort was estimated in free space on the roll."
-    for role, where in (("identification", "in free motion all"), ("validation", "that was not fitted, all")):
+    for role, where in (("identification", "in free motion the"), ("validation", "that was not fitted, the")):
         space = replace(free_space(coverage=0.95), role=role)
-        assert f"{where} 95 % bands are wide enough" in verdict_sentence(None, [replace(unjudged, space=space)])
+        assert f"{where} 95 % band of each joint is wide enough" in verdict_sentence(
+            None, [replace(unjudged, space=space)]
+        )
