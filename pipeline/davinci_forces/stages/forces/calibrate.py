@@ -57,10 +57,12 @@ def gather(motions: Iterable[FreeMotion]) -> Iterator[ErrorBand]:
         logs = np.repeat(np.arange(len(used)), lengths)
         errors = columns["tau_ext_smooth"]
         parts = logs if len(used) >= MIN_LOGS_BAND else logs * LOG_BLOCKS + columns["block"]
+        numbers = np.unique(parts)
+        left_out = [[rms(errors[parts != number])] for number in numbers] if len(numbers) > 1 else [[np.nan]]
         yield ErrorBand(
             joint=joint,
             band_rms=rms(errors),
-            band_rms_std=float(of_left_out(np.array([[rms(errors[parts != part])] for part in np.unique(parts)]))[0]),
+            band_rms_std=float(of_left_out(np.array(left_out))[0]),
             source=np.repeat(np.array([motion.log for motion in used], object), lengths),
             path_of=np.repeat(np.array([motion.path for motion in used], object), lengths),
             **columns,
