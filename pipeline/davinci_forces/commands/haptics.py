@@ -56,12 +56,13 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     from davinci_forces.haptics import limits
     from davinci_forces.haptics import loop as haptic
 
-    if not haptic.is_followed(scenario):
+    response = haptic.response(scenario)
+    if not response.is_followed:
         raise BadRequest(
             f"{scenario.title}: the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so "
             "it follows no hand; state another [arm.body], or another [arm.control]"
         )
-    response, loop = haptic.response(scenario), limits.loop_response(scenario)
+    loop = limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:
         run, found = haptic.experiment(scenario, name, hand), limits.limits_of(scenario, name, hand, loop)

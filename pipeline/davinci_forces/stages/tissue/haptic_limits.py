@@ -51,10 +51,11 @@ def run(
         q_tau or (joint.q_tau if joint else 0.0),
         tuned.delay if tuned else haptics.filter_delay,
     )
-    if not haptic.is_followed(scenario):
+    answer = haptic.response(scenario)
+    if not answer.is_followed:
         yield not_followed(scenario, arm_from)
         return
-    answer, loop = haptic.response(scenario), limits.loop_response(scenario)
+    loop = limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
