@@ -130,8 +130,8 @@ class RefitModel:
 
     def excites_all(self, cells: Equations, out: Booleans) -> bool:
         """Whether the cells of a refit excite every base parameter that all cells excite."""
-        left, every = cells.sum_groups([~out]), sum_all(cells)
-        return excited_parameters(left, self._ridge) == excited_parameters(every, self._ridge)
+        reduced, full = cells.sum_groups([~out]), sum_all(cells)
+        return excited_parameters(reduced, self._ridge) == excited_parameters(full, self._ridge)
 
     def theta(self, cells: Equations, out: Booleans) -> Array:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""

@@ -226,7 +226,7 @@ def estimate_mass(
     std = widen(free.widening * float(np.hypot(run_std, fit_std)), mass, alone[0], test)
     mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weight_log.weight.mass is None else weight_log.weight.mass
-    left = np.array([root_mean_square(weighing.residual(row, mass)) for row in sides[0]])
+    residual_rms = np.array([root_mean_square(weighing.residual(row, mass)) for row in sides[0]])
     tare_mass = free.masses.get(weight_log.tare if tare else "", MassEstimate(float("nan"), float("nan")))
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
@@ -247,7 +247,7 @@ def estimate_mass(
         false_mass=false,
         joint_offset=np.array([weighing.offset(row, mass) if row.varies else np.nan for row in sides[0]]),
         joint_offset_std=np.array([weighing.offset_std(row, MassEstimate(mass, std)) for row in sides[0]]),
-        left_rms=left[:, 0], left_rms_std=left[:, 1],
+        left_rms=residual_rms[:, 0], left_rms_std=residual_rms[:, 1],
         free_error=np.array([free.sigma[joint] for joint in joints]),
         free_error_std=np.array([free.sigma_std.get(joint, float("nan")) for joint in joints]),
     )  # fmt: skip

@@ -151,10 +151,8 @@ class Walk:
         interleaved = bool(toc & IS_INTERLEAVED) and DAQMX_RAW not in {samples.kind for samples in active.values()}
         self.layouts |= {"interleaved" if interleaved else "contiguous"} | ({"big-endian"} if order == ">" else set())
         length = end - data
-        found = (
-            _interleaved(active, order, data, length) if interleaved else _chunks(active, order, data, length, whole)
-        )
-        regions = list(found)
+        read = _interleaved(active, order, data, length) if interleaved else _chunks(active, order, data, length, whole)
+        regions = list(read)
         if more and len(regions) == 1 and stride <= BLOCK and (joined := _joined(regions[0], 1 + more, stride)):
             yield joined
             return

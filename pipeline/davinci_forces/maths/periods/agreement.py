@@ -140,7 +140,7 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
     pairs = counts * others  # 0 if a period or the others have no samples at a phase
     weight = np.divide(totals, pairs, out=np.zeros(pairs.shape), where=pairs > 0)
     degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)  # behind the variance of the others
-    found = list[Difference]()
+    differences = list[Difference]()
     for signal, x in enumerate(signals):
         _, residual = phased.move_to_phases(x)
         sums = _sums(place, residual, counts)
@@ -158,8 +158,8 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
             rho = _lag_one_of_others(np.delete(sums, m, axis=0), np.delete(counts, m, axis=0))
             if is_unlikely(float(ratio[m]) ** 2, rho, K, degrees[m]):
                 period, periods = int(number[first[m]]), int(number[-1]) + 1
-                found.append(Difference(signal, period, periods, float(rms[m]), float(ratio[m])))
-    return found
+                differences.append(Difference(signal, period, periods, float(rms[m]), float(ratio[m])))
+    return differences
 
 
 def _lag_one_of_others(sums: Array, counts: Integers) -> float:

@@ -40,8 +40,8 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
 
 def gather(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[ArmCorrelation]:
     """Collect the correlations of at most `MAX_LOGS_CORRELATION` logs."""
-    every = list(correlations)
-    rows = [every[i] for i in evenly(len(every), MAX_LOGS_CORRELATION)]
+    of_logs = list(correlations)
+    rows = [of_logs[i] for i in evenly(len(of_logs), MAX_LOGS_CORRELATION)]
     if rows:
         yield ArmCorrelation(
             robot=robot.name,

@@ -121,9 +121,8 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     table_rows = tuple(parameter_row(context, fit, i, f"$theta_{n}$", f" of {joint}") for n, i in enumerate(rows, 1))
     coupled = " The parameters of the links are in [@fit-links]." if len(rows) < len(fit) else ""
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
-    error = (
-        f" Mean squared error of the effort: {mse}." if fit.group == joint else ""
-    )  # else of joints of several units
+    # That of a fit to several joints would add efforts of several units.
+    error = f" Mean squared error of the effort: {mse}." if fit.group == joint else ""
     caption = (
         f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
         f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}.{error}{scales(context, joint, fit)}{coupled}"

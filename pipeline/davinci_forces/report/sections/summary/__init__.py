@@ -109,7 +109,7 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     stated = sum(int(contact.stated.sum()) for contact in contacts)
     above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
     unstated = sum(len(contact) for contact in contacts) - stated
-    found = f"{count(unstated, 'contact')} found above"
+    contacts_above = f"{count(unstated, 'contact')} found above"
     text = (
         f"External effort is what the robot exerts on its environment, the opposite of a push on it: "
         f"{efforts_in_words(context)}. It was estimated on {count(len(joints), 'joint')} of the "
@@ -128,9 +128,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
         doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
         level = "the alarm level, which free motion crosses at most once in ten minutes"
-        text = f"{text} **{found} {level}; the study states no window of contact.{peaks}**"
+        text = f"{text} **{contacts_above} {level}; the study states no window of contact.{peaks}**"
         return f"{text}{doubt}" if small else text
-    outside = f" Outside the stated windows, {found} the alarm level." if unstated else ""
+    outside = f" Outside the stated windows, {contacts_above} the alarm level." if unstated else ""
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
     fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
     each = "counted once for each joint on which they are measured"
