@@ -123,6 +123,19 @@ def test_a_saved_study_gives_the_numbers_of_the_arrays_and_a_stream(identified, 
         identified.save(folder)
 
 
+def test_the_log_of_an_external_effort_is_saved_with_its_windows(identified, tmp_path):
+    effort = identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, dq=PUSHED.dq, free=[[0, 4]], contact=[[5, 7]])
+    folder = identified.save(tmp_path / "raw" / "both", push=effort)
+    log = reading.read(folder).log("push")
+    assert (log.role, log.free, log.contact) == ("contact", ((0.0, 4.0),), ((5.0, 7.0),))
+    with np.load(folder / log.files[0]) as saved:
+        assert_allclose(saved[f"{JOINT}.tau"], PUSHED.tau)
+        assert_allclose(saved["time"], PUSHED.t)
+    with pytest.raises(BadRequest, match="identification-1 is the name of an identified log"):
+        identified.save(tmp_path / "other", **{"identification-1": effort})
+    assert not (tmp_path / "other").exists()
+
+
 def test_settings_are_saved_and_a_robot_of_no_file_is_not(identified, folder, tmp_path):
     given = {"effort": {JOINT: 0.5}, "lowpass": 11.0}
     arguments = {"dq": FIRST.dq, "joints": JOINT, "period": 2.0, "settings": given}

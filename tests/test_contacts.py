@@ -204,6 +204,19 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
     assert {"contact.push.hand_roll.1.peak", "contact.push.hand_roll.2.impulse"} <= keys
 
 
+def test_a_push_that_is_held_reads_its_level_in_the_middle_of_the_contact():
+    """A push of 5 for 4 s, ramps of .5 s included, in a stated window that is far wider, and one that nobody stated."""
+    held = 5.0 * np.clip(np.minimum(T - 10.0, 14.0 - T) / 0.5, 0.0, 1.0)
+    space, *_ = assess.run(track(noise(1), log="check", role="validation"), entry(role="validation"), arm.ARM)
+    for windows in ((), ((8.0, 17.0),)):
+        about = entry(role="contact", contact=windows)
+        [contact] = measured(track(noise() + held), assess.gather([space]), about)
+        assert contact.middle_mean[0] == pytest.approx(5.0, abs=3 * contact.middle_mean_std[0])
+        assert 0.0 < contact.middle_mean_std[0] < 0.1
+        assert contact.mean[0] < 4.6
+        assert abs(contact.peak[0] - 5.0) > 3 * contact.middle_mean_std[0]
+
+
 def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),)), arm.ARM))
     assert not list(assess.run(track(noise()), entry(role="contact"), arm.ARM))

@@ -171,7 +171,8 @@ class IdentifiedArm:
             If the arrays are wrong, or no joint has a model.
         """
         values = {"q": q, "tau": np.zeros(np.shape(q))} | ({} if dq is None else {"dq": dq})
-        reading = self._run_on(t, values, PREDICTED)
+        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
+        reading = self._run(PREDICTED, self._contact_log(NEW, columns))
         models = [model for model in reading(JointModel) if model.log == NEW]
         if not models:
             raise BadRequest("\n".join(["the effort of no joint is predicted", *new_texts(reading)]))
@@ -199,36 +200,45 @@ class IdentifiedArm:
             If the arrays are wrong, or no joint has a model.
         """
         windows = {name: [[*window] for window in of] for name, of in (("free", free), ("contact", contact)) if len(of)}
-        reading = self._run_on(t, {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq}), MEASURED, windows)
+        values = {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq})
+        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
+        reading = self._run(MEASURED, self._contact_log(NEW, columns, windows))
         tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
         texts = new_texts(reading)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
-        return ExternalEffort(tuple(tracks), tuple(contacts), tuple(self._effort_label(t.joint) for t in tracks), texts)
+        labels = tuple(self._effort_label(track.joint) for track in tracks)
+        return ExternalEffort(tuple(tracks), tuple(contacts), labels, texts, (columns, windows))
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, **contact_logs: "ExternalEffort") -> Path:
         """Write the identified logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` reports.
 
-        Other logs, such as those of `external_effort`, are added to it like those of any study.
+        The logs of external efforts are written, too, each under its name: `arm.save("raw/mine", push=effort)`.
 
         Raises
         ------
         NotAFile
             If the folder exists.
         BadRequest
-            If the robot was given as an object, of which there is no file.
+            If the robot was given as an object, of which there is no file, or two logs have one name.
         """
         target, (robot, settings) = Path(folder), self._arguments
+        if taken := sorted({log.name for log in self._study.logs} & {*contact_logs}):
+            raise BadRequest(f"{taken[0]} is the name of an identified log; give the other log another name")
         if isinstance(robot, Robot):
             raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
         lines = ['title = "From arrays"', f"robot = {in_toml(Path(robot).name)}", "simulated = false"]
         lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
-        for log in self._study.logs:
+        more = [self._contact_log(name, *effort._log) for name, effort in contact_logs.items()]
+        logs = (*self._study.logs, *more)
+        for log in logs:
             lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(*log.files)}"]
             lines += [f"role = {in_toml(log.role)}", *([f"period = {log.period}"] if log.period else [])]
+            windows = {"contact": log.contact, "free": log.free}
+            lines += [f"{name} = {in_toml([list(window) for window in of])}" for name, of in windows.items() if of]
             lines += ["[log.channels]"]
             lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
-        files = [self._study.folder / file for log in self._study.logs for file in log.files]
+        files = [self._study.folder / file for log in logs for file in log.files]
         files += [Path(robot)] if Path(robot).suffix else []
         contents = {file.name: read_bytes(file) for file in files}
         write_folder(target, contents | {"study.toml": ("\n".join(lines) + "\n").encode()})
@@ -276,11 +286,8 @@ class IdentifiedArm:
         refuse(table)
         return entry
 
-    def _run_on(
-        self, t: Samples, values: dict[str, Samples], stage: str, windows: Mapping[str, Any] | None = None
-    ) -> Any:
-        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
-        return self._run(stage, self._saved(self._study.folder, NEW, columns, None, "contact", **(windows or {})))
+    def _contact_log(self, name: str, columns: Columns, windows: Mapping[str, Any] | None = None) -> LogEntry:
+        return self._saved(self._study.folder, name, columns, None, "contact", **(windows or {}))
 
     def _run(self, stage: str, *more: LogEntry) -> Any:
         """Run the stages up to this one, without output; return what reads the records of a kind."""
@@ -308,7 +315,8 @@ class ExternalEffort:
     record: tuple[Track, ...]
     contact_record: tuple[Contact, ...]
     labels: tuple[str, ...]
-    diagnostics: tuple[str, ...] = field(default=(), repr=False)
+    diagnostics: tuple[str, ...] = field(repr=False)
+    _log: tuple[Columns, dict[str, Any]] = field(repr=False)  # for `IdentifiedArm.save`
 
     @property
     def t(self) -> Array:
@@ -327,7 +335,7 @@ class ExternalEffort:
 
     @property
     def contacts(self) -> pd.DataFrame:
-        """The detected contacts: joint, onset and release [s], peak, mean and impulse with their standard errors."""
+        """The detected contacts: joint, onset and release [s], peak, mean of the middle half, mean and impulse."""
         names = [name for name in Contact.columns() if name not in ("stated", "found")]
         frames = [as_frame(contact)[["joint", *names]] for contact in self.contact_record]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["joint", *names])

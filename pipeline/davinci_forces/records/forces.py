@@ -189,7 +189,8 @@ class Contact(LogJointRecord):
     """The contacts of one joint in one log: its effort on the environment, and its detection level."""
 
     PUBLISHED = (
-        "contact.{log}.{joint}.{row}: peak± t_peak mean± impulse± onset± release± duration± above stated found",
+        "contact.{log}.{joint}.{row}: "
+        "peak± t_peak middle_mean± mean± impulse± onset± release± duration± above stated found",
     )
 
     filter: str
@@ -207,6 +208,8 @@ class Contact(LogJointRecord):
     t_peak: Column
     peak: Column  # with half of what the smoother takes off the tip of a triangle
     peak_std: Column
+    middle_mean: Column
+    middle_mean_std: Column
     mean: Column
     mean_std: Column
     impulse: Column

@@ -14,8 +14,8 @@ SUBJECTS = {  # what a key is about, by its first part; other keys are of the st
 PAGE_ONE = ("model_error", "detection_level", "coverage")  # last parts of its keys
 OF_CANDIDATES = ("fit", "choice", "cv", "predict", "search", "guess", "identifiability", "correlation")
 RANKS = {  # to sort by
-    "page one": 0, "model": 1, "contacts": 1, "forces": 2, "noise": 2, "study": 2,
-    "standard errors": 3, "candidates": 4,
+    "page one": 0, "model": 1, "contacts": 1, "forces": 2, "study": 2, "noise": 3,
+    "standard errors": 4, "candidates": 5,
 }  # fmt: skip
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
 RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated

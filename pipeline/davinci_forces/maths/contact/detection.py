@@ -173,22 +173,35 @@ def summarise(
     `constant_std` (N,) is the part of the deviation that no mean reduces and that free motion does not show.
     """
     (tau_ext, std, direct), (start, end) = effort, window
-    within = (t >= start) & (t <= end)
-    times, inside = t[within], tau_ext[within]
+    inside = tau_ext[(t >= start) & (t <= end)]
     if not len(inside):
         return None
-    duration, edges = end - start, np.concatenate([[start], 0.5 * (times[1:] + times[:-1]), [end]])
-    # Each sample counts for the time around it, within window and log; a log of one sample, too.
-    shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
-    mean = float(np.average(direct[within], weights=shares))
-    constant = 0.0 if constant_std is None else float(constant_std[within].mean())
-    widening = students_95(max(int(free.sum()) // len(inside), 1)) / NORMAL_95
-    mean_std = float(np.hypot(widening * mean_size(direct, free, len(inside)), constant))
+    mean, mean_std = mean_effort(t, direct, window, free, constant_std)
+    duration = end - start
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))
     rounded, largest = HALF * rounded_off(t, tau_ext, k, rise), float(tau_ext[k])
     peak = largest + rounded, float(np.hypot(noise_std, rounded))
     return Summary(*peak, mean, mean_std, mean * duration, mean_std * duration, noise_std, largest, float(t[k]))
+
+
+def mean_effort(
+    t: Array, direct: Array, window: tuple[float, float], free: Booleans, constant_std: Array | None = None
+) -> tuple[float, float]:
+    """Mean of measured minus modelled effort (N,) in a window [s] of at least one sample, and its standard error.
+
+    `free` and `constant_std` are those of `summarise`.
+    """
+    start, end = window
+    within = (t >= start) & (t <= end)
+    times, samples = t[within], int(within.sum())
+    edges = np.concatenate([[start], 0.5 * (times[1:] + times[:-1]), [end]])
+    # Each sample counts for the time around it, within window and log; a log of one sample, too.
+    shares = np.diff(edges.clip(t[0], t[-1])) + np.finfo(float).tiny
+    constant = 0.0 if constant_std is None else float(constant_std[within].mean())
+    widening = students_95(max(int(free.sum()) // samples, 1)) / NORMAL_95
+    error = np.hypot(widening * mean_size(direct, free, samples), constant)
+    return float(np.average(direct[within], weights=shares)), float(error)
 
 
 def rounded_off(t: Array, tau_ext: Array, k: int, rise: float) -> float:

@@ -27,16 +27,16 @@ def section(context: Context) -> Iterator[Block]:
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Peak: to "
-            "compare with the largest reading of a gauge, or a steady one. Mean and impulse: of the stated window, or "
-            "from onset to release, with rise and fall. Verdict: whether the peak exceeds the detection "
-            "level; “peak only” if it does but stays below the alarm level; “found” for a contact outside the windows "
-            "that the study states, and “small” if its peak is below twice the alarm level, so that it may be an error "
-            "of the model."
+            "compare with the largest reading of a gauge. Middle half: the mean over the middle half of the time from "
+            "onset to release, to compare with a steady reading. Impulse: of the stated window, or from onset to "
+            "release. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below "
+            "the alarm level; “found” for a contact outside the windows that the study states, and “small” if its peak "
+            "is below twice the alarm level, so that it may be an error of the model."
         )
-        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Mean", "Impulse", "Verdict")
+        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Middle half", "Impulse", "Verdict")
         earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
         of_contacts: list[tuple[Cell, ...]] = []
-        names = ("onset", "release", "peak", "mean", "impulse")
+        names = ("onset", "release", "peak", "middle_mean", "impulse")
         for contact in contacts:
             for i in range(len(contact)):
                 numbers = context.numbers(f"contact.{contact.log}.{contact.joint}.{i + 1}", names)

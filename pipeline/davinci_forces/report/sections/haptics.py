@@ -16,9 +16,9 @@ SAMPLES_DRAWN = 300  # samples of a run in its figure
 def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The haptic loop.  Section 8.4"""
     responses = context.catalogue.records(HapticResponse)
+    yield Prose(experiment(context, responses))
     figures = (*(traces(context, run) for run in runs), *map(response_figure, responses))
-    heading = "The haptic loop, simulated: the force that each hand feels, and its error"
-    yield OnScreen(heading, "haptic-loop", (Prose(experiment(context, responses)), *figures))
+    yield OnScreen("The force that each hand feels, over time and over frequency", "haptic-loop", figures)
 
 
 def experiment(context: Context, responses: list[HapticResponse]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact import detection
 from davinci_forces.maths.contact.detection import Event
 from davinci_forces.maths.signals.standstill import SLOW
@@ -121,11 +121,12 @@ def contacts(
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
+            middle = middle_effort(track, (onset, release), free, friction_std) or summary[2:4]
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             # A short peak is flattened below the mean; its error stays.
             peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))
             above = clear and bool(is_above[~is_outside(track.t, [window])].any())
-            measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *impulse)
+            measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *middle, *impulse)
             rows.append((stated, event is not None, above, *measured))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
@@ -135,7 +136,7 @@ def contacts(
         return
     names = (
         "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std",
-        "t_peak", "peak", "peak_std", "mean", "mean_std", "impulse", "impulse_std",
+        "t_peak", "peak", "peak_std", "mean", "mean_std", "middle_mean", "middle_mean_std", "impulse", "impulse_std",
     )  # fmt: skip
     yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
 
@@ -143,6 +144,18 @@ def contacts(
 def steady_effort(track: Track) -> tuple[Array, Array]:
     """The smoothed effort (N,) and its deviation (N,) without what is rounded off, which is added to that of a peak."""
     return track.tau_ext_smooth, detection.without_rounding(track.tau_ext_smooth_std, track.tau_ext_rounding)
+
+
+def middle_effort(track: Track, contact: Window, free: Booleans, friction_std: Array) -> tuple[float, float] | None:
+    """Mean effort over the middle half of a contact, and its standard error; None without a sample in it.
+
+    A push that is held has risen by then, unlike in the mean, and noise does not raise it, as it does a peak.
+    """
+    quarter = 0.25 * (contact[1] - contact[0])
+    middle = contact[0] + quarter, contact[1] - quarter
+    if is_outside(track.t, [middle]).all():
+        return None
+    return detection.mean_effort(track.t, track.tau_ext_direct, middle, free, friction_std)
 
 
 def hidden_peak(track: Track, onset: float) -> str:
