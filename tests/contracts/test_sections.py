@@ -50,7 +50,8 @@ from davinci_forces.report.content import (
     name_of,
     walk,
 )
-from davinci_forces.report.content.layout import number_blocks
+from davinci_forces.report.content.inline import parse
+from davinci_forces.report.content.layout import TEXTS, number_blocks
 from davinci_forces.report.content.marks import Line, Points, VSpan
 from davinci_forces.report.context import Context, name_in_sentence, title
 from davinci_forces.report.results import Results, collect
@@ -60,6 +61,7 @@ from davinci_forces.report.sections import (
     excitation,
     ground_truth,
     joints,
+    methods,
     noise,
     parts,
     provenance,
@@ -128,6 +130,11 @@ def full(lab: Lab, catalogue: Catalogue) -> Context:
     return context(lab, catalogue)
 
 
+@pytest.fixture(scope="module")
+def faulty(faulty_lab: Lab, faulty_catalogue: Catalogue) -> Context:
+    return context(faulty_lab, faulty_catalogue)
+
+
 @SECTION
 def test_a_study_that_has_everything_has_the_section(name: str, full: Context):
     section = written(name, full)
@@ -147,6 +154,25 @@ def test_figures_and_equations_are_told_in_other_words_to_those_who_do_not_see_t
         if isinstance(block, Equation):
             assert block.alt.strip()
             assert block.alt != block.typst
+
+
+@SECTION
+def test_no_text_shows_a_backtick_or_a_hyphen_for_a_minus(name: str, full: Context, faulty: Context):
+    studies = (replace(about, study=replace(about.study, baseline="before")) for about in (full, faulty))
+    for section in filter(None, (written(name, about) for about in studies)):
+        texts = [text for block in walk(section) for text in TEXTS[type(block)](block)]
+        spans = [span.text for text in texts for span in parse(text) if span.kind in ("text", "bold")]
+        assert [text for text in spans if "`" in text or re.search(r"(?<![\w.-])-\.?\d", text)] == []
+
+
+@SECTION
+def test_what_is_called_a_relative_error_is_without_noise(name: str, full: Context):
+    tables = [block for block in walk(section) if isinstance(block, Table)] if (section := written(name, full)) else []
+    for table in tables:
+        for head, *cells in zip(table.header, *table.rows, strict=True):
+            keys = [cell.key or "" for cell in cells if isinstance(cell, Number)]
+            of_residuals = [key for key in keys if key.startswith(("predict.", "cv.")) and "relative_error" in key]
+            assert head == "Relative residual" if of_residuals else head != "Relative residual"
 
 
 @SECTION
@@ -240,6 +266,18 @@ def test_of_remarks_that_differ_in_log_and_numbers_paper_has_the_first(full: Con
     assert printed == [f"{texts[0]} (2 more remarks of this kind)"]
     [hidden] = [block.blocks for block in blocks if isinstance(block, OnScreen) and block.anchor == "all-remarks"]
     assert [len(items.items) for items in hidden if isinstance(items, Bullets)] == [3]
+
+
+def test_the_code_in_a_remark_is_marked_up(full: Context):
+    text = "push/hand_roll: positions from -0.1 to 1 rad; correct `limits`, by which `excite` designs"
+    remark = diagnostic("resample", "push.hand_roll", "warning", text)
+    records = Catalogue(lambda kind: [remark] if kind is Diagnostic else full.catalogue.records(kind))
+    about = replace(full, catalogue=records)
+    blocks = [*runs.recording_blocks(about, full.catalogue.records(LogSummary))]
+    shown = [item for block in blocks if isinstance(block, Bullets) for item in block.items]
+    for item in (shown[-1], *[look for _, look in caveats.looks_at(about, []) if "excite" in look]):
+        assert [span.text for span in parse(item) if span.kind == "code"] == ["limits", "excite"]
+        assert "from −0.1 to 1 rad" in item
 
 
 def test_why_logs_have_no_force_at_the_tip_is_stated_also_where_no_log_has_one(full: Context, catalogue: Catalogue):
@@ -404,6 +442,67 @@ def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue
     assert told(context(lab, catalogue)) == every
     assert told(context(lab, without(catalogue, Track))) == every - {"model", "innovation", "correction"}
     assert told(context(lab, without(catalogue, *KINDS.values()))) == set()
+
+
+def paragraph(about: Context) -> str:
+    return " ".join(methods.paragraph_for_paper(about).split())
+
+
+def test_the_paragraph_for_a_paper_names_filter_and_smoother_the_data_and_each_joint_s_own_numbers(full: Context):
+    text = paragraph(full)
+    assert "an extended Kalman filter" in text
+    assert "and then a fixed-interval smoother (Bierman, 1973) without delay" in text
+    assert "estimated from motor efforts and joint positions" in text
+    fits = {joint.name: full.shown_fit(joint.name) for joint in full.study.robot.joints}
+    assert not any(fit.periods for fit in fits.values())  # the chosen model is not fitted to averages
+    logs = {log for fit in fits.values() for log in fit.logs}
+    summaries = [s for s in full.catalogue.records(LogSummary) if s.log in logs]
+    data = f"all motion in {len(summaries)} simulated logs at 50 Hz"
+    assert f"{data}, {sum(s.duration for s in summaries):.0f} s in all (again, pitch, roll, slide: 5 periods of" in text
+    for joint, fit in fits.items():
+        [one] = re.findall(rf"{joint.replace('_', ' ')}: (.*?)[;.] ?(?:instrument|hand|For)", text)
+        assert f"({len(fit)} parameters, " in one
+        assert f"low-pass of {fit.cutoff[0]:g} Hz" in one
+        for name, key in (("alarm level", f"threshold.{joint}.alarm_level"), ("coverage", f"band.{joint}.coverage")):
+            assert f"{name} {full.number(key, 2)}" in one
+    [weight] = full.catalogue.records(Weight)
+    mass = full.number(f"weight.{weight.log}.mass", 2)
+    assert f"Of known masses, {weight.stated_mass:g} kg was estimated as {mass}." in text
+    assert "known masses" not in paragraph(replace(full, catalogue=without(full.catalogue, Weight)))
+
+
+def test_the_paragraph_counts_of_averaged_logs_whole_periods_alone(full: Context):
+    about = replace(full, study=replace(full.study, settings=replace(full.study.settings, fit="independent.lse")))
+    used = [about.shown_fit(joint.name) for joint in about.study.robot.joints]
+    assert all(fit.periods for fit in used)
+    period = {name: full.results[f"period.{name}"].value for fit in used for name in fit.logs}
+    number = {name: full.results[f"period.{name}.periods"].value for name in period}
+    seconds = sum(period[name] * number[name] for name in period)
+    text = paragraph(about)
+    data = f"averages over the whole periods of {len(period)} simulated logs at 50 Hz, {seconds:.0f} s in all"
+    assert f"identified from {data} (again, pitch, roll, slide: 5 periods of 2.000 s)" in text
+    assert "low-pass of" not in text.partition("Results")[2].partition("For the errors")[0]
+    assert "The model was independent.lse." in text
+
+
+def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_share_once(full: Context):
+    [chosen, *_] = [full.shown_fit(joint.name) for joint in full.study.robot.joints]
+    names = [joint.name for joint in full.study.robot.joints]
+    rows = {name: np.tile(getattr(chosen, name), len(names)) for name in chosen.columns()}
+    rows["parameter"] = np.array([f"{p} of {joint}" for joint in names for p in chosen.parameter], object)
+    rows["phi"] = rows["phi"].copy()
+    rows["phi"][1] = "partial"
+    arm = replace(chosen, group="arm", structure="coupled", cutoff=(8.0, 9.0, 10.0), **rows)
+    fits = [fit for fit in full.catalogue.records(Fit) if fit.model == "independent"]
+    records = Catalogue(lambda kind: [*fits, arm] if kind is Fit else full.catalogue.records(kind))
+    log = replace(full.study.logs[0], channels=(Source("hand_roll.i", "current", "current"),))
+    about = replace(full, catalogue=records, study=replace(full.study, logs=(log, *full.study.logs[1:])))
+    text = paragraph(about)
+    assert "from motor currents and stated torque constants, motor efforts and joint positions" in text
+    together = "describes hand roll, hand pitch and instrument slide together"
+    assert f"One model with {len(arm)} parameters {together}." in text
+    assert f"({len(arm)} parameters" not in text
+    assert [cutoff for cutoff in (8, 9, 10) if f"low-pass of {cutoff} Hz" in text] == [8, 9, 10]
 
 
 def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
@@ -720,13 +819,13 @@ def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_onl
     panels = list(summary.effort_panel(about, trusted))
     assert panels[0].title == f"Hand roll, {worst}"
     assert [len(mark.x) for mark in panels[0].marks if isinstance(mark, Points)] == [1]
-    assert "contact windows shaded" in summary.caption(touched, panels)
+    assert "contact windows shaded" in summary.caption(about, touched, panels)
     logs = tuple(replace(log, contact=() if log.name == worst else log.contact) for log in lab.study.logs)
     panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
     assert worst not in panels[0].title  # an error that holds the pushes is none of the model
     logs = tuple(replace(log, contact=()) for log in lab.study.logs)
     panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
-    assert "shaded" not in summary.caption(touched, panels)
+    assert "shaded" not in summary.caption(about, touched, panels)
 
 
 @pytest.mark.parametrize(("period", "advice"), [(1, " The arm may not yet have settled: set `skip`."), (3, "")])
@@ -795,13 +894,53 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
 def test_page_one_names_the_log_of_all_panels_and_peaks_once(full: Context):
     panels = [Panel(f"Joint {i}, push", "time [s]", "effort [N m]", ()) for i in range(4)]
     assert [panel.title for panel in summary.in_column(panels)] == [f"Joint {i}" for i in range(4)]
-    assert summary.caption(full.catalogue.records(Contact), panels).startswith("External effort of each joint in push")
+    contacts = full.catalogue.records(Contact)
+    assert summary.caption(full, contacts, panels).startswith("External effort of each joint in push")
     other = [*panels, Panel("Joint 4, tip", "time [s]", "effort [N m]", ())]
     assert [panel.title for panel in summary.in_column(other)] == [panel.title for panel in other]
-    assert summary.caption(full.catalogue.records(Contact), other).startswith("External effort of each joint. ")
+    assert summary.caption(full, contacts, other).startswith("External effort of each joint. ")
     tip = [contact for contact in full.catalogue.records(Contact) if contact.log == "tip"]
     assert summary.peaks_in_words(full, tip).count("tip") == 1
     assert summary.peaks_in_words(full, tip).startswith(" Contact peaks in tip: ")
+
+
+def test_page_one_says_which_panels_show_no_contact_log_and_where_dots_stand(full: Context):
+    contacts, dot = full.catalogue.records(Contact), Points(np.zeros(1), np.ones(1))
+    panels = [Panel(f"Joint {i}, {log}", "", "", ()) for i, log in enumerate(("push", "check", "roll"))]
+    told = summary.caption(full, contacts, panels)
+    assert " Joint 1 and Joint 2: in no contact log, so the worst run in free space is shown. " in told
+    assert "in no contact log" not in summary.caption(full, contacts, panels[:1])
+    assert "Dots" not in told
+    told = summary.caption(full, contacts, [replace(panels[0], marks=(dot,))])
+    assert told.endswith(" Dots: peaks, beyond the curve by half of what smoothing takes off them.")
+
+
+def test_a_found_contact_is_outside_windows_only_where_some_are_stated(full: Context):
+    def told(about: Context) -> str:
+        [table] = [block for block in walk(written("contacts", about)) if name_of(block) == "contact-table"]
+        return table.caption
+
+    contacts = full.catalogue.records(Contact)
+    none = [replace(contact, stated=0 * contact.stated) for contact in contacts]
+    found = Catalogue(lambda kind: none if kind is Contact else full.catalogue.records(kind))
+    assert "“found” for a contact outside the windows that the study states" in told(full)
+    assert "“found” for a contact, as the study states no window" in told(replace(full, catalogue=found))
+
+
+def test_the_poor_agreement_of_joints_on_a_mass_is_in_its_verdict_and_on_page_one(full: Context):
+    [of, *_] = full.catalogue.records(Weight)
+    for agreement, is_told in ((0.015, True), (0.5, False)):
+        poor = replace(of, agreement=agreement)
+        records = Catalogue(lambda kind, poor=poor: [poor] if kind is Weight else full.catalogue.records(kind))
+        about = replace(full, catalogue=records)
+        mass, clause = full.number(f"weight.{of.log}.mass", 3), " (its joints agree poorly: p-value 0.015)" * is_told
+        assert f"estimated from the efforts is {mass}{clause}, " in weight_section.verdict(about, poor).text
+        assert [f"mass {mass}{clause}, stated " in line for line in opening.masses(about)] == [True]
+
+
+def test_the_force_at_the_tip_says_what_is_added_to_its_peak(full: Context):
+    prose = [block.text for block in walk(written("tip", full)) if isinstance(block, Prose)]
+    assert prose[0].endswith("takes off is added to the largest force of a contact, and half to its error.")
 
 
 def test_page_one_states_every_peak_if_they_are_few_and_where_none_is(full: Context, monkeypatch):

@@ -75,5 +75,5 @@ def test_what_the_model_gains_is_the_error_of_its_worst_log_that_was_not_fitted(
     logs = set(predicted[predicted["role"] != "identification"]["log"])
     errors = {log: results[f"predict.{log}.{JOINT}.chosen.relative_error"] for log in logs}
     worst = max(errors, key=lambda log: errors[log])
-    assert f"its relative error (noise included) is largest in {worst}" in page
+    assert f"its relative residual (noise included) is largest in {worst}" in page
     assert f"{errors[worst]:.3g}" in page

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import HOSTILE
 
-from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal
-from davinci_forces.report.content.inline import Span, parse, printable
+from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, in_format, literal
+from davinci_forces.report.content.inline import Span, message, parse, printable
 from davinci_forces.report.content.layout import columns, number_blocks, references
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
@@ -22,6 +22,34 @@ def test_literal_text_is_one_span_of_text_and_comes_back_unchanged(text: str) ->
 def test_literal_text_inside_code_and_bold_stays_inside(text: str) -> None:
     for kind, mark in (("code", "`"), ("bold", "**")):
         assert parse(f"{mark}{literal(text)}{mark}") == (Span(kind, printable(text)),)
+
+
+def test_a_message_has_its_code_marked_up_and_all_else_as_it_is() -> None:
+    spans = parse(message("run-1 of a[*b*]: -0.0672 to -.5 rad; set `sign = -1` by `$ x`"))
+    assert spans == (
+        Span("text", "run-1 of a[*b*]: −0.0672 to −.5 rad; set "),
+        Span("code", "sign = -1"),
+        Span("text", " by "),
+        Span("code", "$ x"),
+    )
+    assert parse(message("a`b is -1")) == (Span("text", "a`b is -1"),)  # the name of a channel
+
+
+@given(anything)
+def test_a_message_loses_no_letter(text: str) -> None:
+    def bare(x: str) -> str:
+        return x.replace("`", "").replace("−", "-")
+
+    assert bare("".join(span.text for span in parse(message(text)))) == bare(printable(text))
+
+
+@pytest.mark.parametrize(
+    ("value", "form", "shown"),
+    [(-2.54, ".1f", "−2.5"), (-0.04, ".1f", "0.0"), (0.04, "+.1f", "0.0"), (2.0, "+.1f", "+2.0"), (-3, "d", "−3"),
+     (float("nan"), ".1f", "–"), (-1e-9, "g", "−1e−09")],
+)  # fmt: skip
+def test_a_number_has_a_true_minus_and_a_printed_zero_no_sign(value: float, form: str, shown: str) -> None:
+    assert in_format(value, form) == shown
 
 
 def test_marks_are_read_and_a_mark_without_its_partner_is_text() -> None:

@@ -93,7 +93,7 @@ def test_friction_has_a_curve_a_direction_and_one_of_each_branch_where_it_has_a_
     assert len(drawn) == lines
     assert [bool(line.label) for line in drawn] == [True] + [False] * (lines - 1)
     assert all(np.all(np.sign(line.x) == np.sign(line.x[0])) and np.all(np.diff(line.x) >= 0) for line in drawn)
-    assert friction_in_words(friction(model)) == "-3.5 on average backwards and 3.5 forwards."
+    assert friction_in_words(friction(model)) == "−3.5 on average backwards and 3.5 forwards."
 
 
 @pytest.mark.parametrize("model", ["independent", "chosen"])

@@ -20,6 +20,7 @@ from davinci_forces.report.verdicts import (
     band,
     band_in_words,
     decisive,
+    doubt_of_mass,
     grade,
     is_impossible,
     is_mostly_constant,
@@ -182,6 +183,15 @@ def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, l
     assert mass_level(weight(**exact, differing="roll"), []) == ("warn", "joints")
     for known in (0.097, float("nan")):
         assert mass_level(weight(mass=-0.09, mass_std=0.04, stated_mass=known), []) == ("warn", "sign")
+
+
+@pytest.mark.parametrize(
+    ("agreement", "side", "told"),
+    [(0.015, "as stated", " (its joints agree poorly: p-value 0.015)"), (0.06, "as stated", ""),
+     (1e-5, "as stated", " (its joints agree poorly: p-value < 0.001)"), (0.015, "the other one", "")],
+)  # fmt: skip
+def test_joints_that_agree_poorly_on_a_mass_are_told_of(agreement, side, told):
+    assert doubt_of_mass(weight(agreement=agreement, side=side)) == told
 
 
 @pytest.mark.parametrize(

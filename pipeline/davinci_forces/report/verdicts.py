@@ -13,6 +13,7 @@ from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Pr
 from davinci_forces.records.forces import MIN_COVERAGE
 from davinci_forces.records.weight import TorqueConstant, Weight
 from davinci_forces.report.content import Cell, Level
+from davinci_forces.report.content.number import Number, in_format
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
@@ -30,6 +31,7 @@ SMALL = 2.0  # of the alarm level: peaks of contacts below it may be errors of t
 COVERED = (MIN_COVERAGE, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit
 WITHIN = {1: 0.6827, 2: 0.95, 4: 0.99994}  # share of right errors below this number of standard errors
+DOUBTED = 0.05  # probability of the joints' masses, if they agree, below which a verdict states it
 UNLIKELY = 0.01  # probability below which a test fails
 MAX_PERIOD_NOISE = 3.0  # noise of a period over that of the median period
 MAX_DUPLICATES = 0.1  # share of the rows of a log that repeat the row before
@@ -178,6 +180,12 @@ def mass_level(weight: Weight, constants: Sequence[TorqueConstant]) -> tuple[Lev
     return ("good", "right") if weight.mass_std <= PRECISE * weight.stated_mass else ("warn", "wide")
 
 
+def doubt_of_mass(weight: Weight) -> str:
+    """How well the joints agree on a mass, in brackets after it, where they do so poorly; else ""."""
+    is_poor = weight.agreement < DOUBTED and weight.side != "the other one"
+    return f" (its joints agree poorly: p-value {Number(weight.agreement, digits=2, least=0.001)})" * is_poor
+
+
 def is_taken(constant: TorqueConstant) -> bool:
     """Whether the torque constant in use is the one that the log gives, to three or more digits."""
     given, used = constant.torque_constant, constant.torque_constant_used
@@ -254,7 +262,7 @@ def band_in_words(coverage: float, coverage_std: float = 0.0) -> str:
 
 def percent(share: float) -> str:
     """A share as it is printed."""
-    return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else f"{round(100 * share) + 0:d} %"
+    return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else in_format(round(100 * share), "d") + " %"
 
 
 def thresholds() -> tuple[tuple[Cell, ...], ...]:

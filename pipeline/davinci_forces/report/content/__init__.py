@@ -11,15 +11,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, TypeVar
 
-from davinci_forces.report.content.inline import literal, printable
+from davinci_forces.report.content.inline import literal, message, printable
 from davinci_forces.report.content.marks import AnyMark, Line3D, Points3D
-from davinci_forces.report.content.number import Number
+from davinci_forces.report.content.number import Number, in_format
 from davinci_forces.report.content.thinning import points_of, thin_mark
 from davinci_forces.study.review import Rating
 
 __all__ = [
     "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "Level", "Listing", "Number", "OnScreen",
-    "Panel", "Prose", "Rated", "Section", "Table", "Verdict", "literal", "name_of", "walk",
+    "Panel", "Prose", "Rated", "Section", "Table", "Verdict", "in_format", "literal", "message", "name_of", "walk",
 ]  # fmt: skip
 
 Cell = str | Number

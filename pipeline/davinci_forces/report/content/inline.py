@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Literal, NamedTuple
 
 from davinci_forces.files import visible
+from davinci_forces.report.content.number import MINUS
 
 Kind = Literal["text", "code", "bold", "maths", "reference", "link"]
 
@@ -20,6 +21,8 @@ MARK = re.compile(
     re.DOTALL,
 )
 
+NEGATIVE = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")  # the sign of a number, not the hyphen of a name
+
 
 class Span(NamedTuple):
     """A run of text of one kind."""
@@ -32,6 +35,14 @@ class Span(NamedTuple):
 def literal(text: str) -> str:
     """Escape text that may hold anything, so that it is shown as it is wherever inline marks are read."""
     return re.sub(r"([\\$`*\[])", r"\\\1", printable(text))
+
+
+def message(text: str) -> str:
+    """A message of the tool, as marked text: backticks enclose code, a minus is a true one, all else is as it is."""
+    parts = text.split("`")
+    if len(parts) % 2 == 0:  # a name from a log has one
+        return literal(text)
+    return "`".join(literal(part if i % 2 else NEGATIVE.sub(MINUS, part)) for i, part in enumerate(parts))
 
 
 def printable(text: str) -> str:

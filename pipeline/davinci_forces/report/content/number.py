@@ -39,6 +39,12 @@ class Number:
         return _significant(self.value, self.digits).replace("-", MINUS)
 
 
+def in_format(value: float, form: str) -> str:
+    """A number in a format such as `.1f`: a true minus sign, no sign of a printed zero, a dash if it is not finite."""
+    text = f"{value:{form}}" if math.isfinite(value) else MISSING
+    return text.replace("-", MINUS) if text == MISSING or float(text) else text.lstrip("+-")
+
+
 def _with_std(value: float, std: float) -> str:
     exponent = _exponent(max(abs(value), std), 2)
     last = _exponent(std, 2) - 1  # the power of ten of the last printed digit

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import marks
-from davinci_forces.report.content.number import MINUS
+from davinci_forces.report.content.number import in_format
 from davinci_forces.report.figures.palette import AXES, COLOURS, WORDS
 from davinci_forces.report.figures.shapes import SMALL_SIZE, path, symbols, trace, words
 from davinci_forces.report.figures.ticks import Axis
@@ -155,7 +155,7 @@ def draw_tiles(mark: marks.Tiles, frame: Frame) -> str:
         colour, half = COLOURS[mark.colour if value >= 0 else mark.opposite], TILE / 2
         box = frame.box(column - half, column + half, row - half, row + half)
         x, y = float(frame.place_x([column])[0]), float(frame.place_y([row])[0])
-        number = f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS)
+        number = in_format(value, ".2f")
         svg += path(box, fill(colour, 0.6 * min(abs(value), 1.0))) + words(x, y + 3, number, WORDS, anchor="middle")
     return svg
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.content.number import MINUS, ten_to
+from davinci_forces.report.content.number import in_format, ten_to
 
 FEW_DECADES = 3  # axes of fewer decades are also numbered at 2 and 5
 PLAIN_RANGE = (2e-3, 2e4)  # no power of ten is taken out if the largest magnitude is in this range
@@ -114,7 +114,7 @@ def round_values(low: float, high: float, intervals: int) -> tuple[Array, float]
 def in_digits(values: Array, step: float) -> tuple[str, ...]:
     """Numbers in as many decimals as their step needs."""
     decimals = next((d for d in range(9) if abs(round(step, d) - step) < ROUNDING * step), 9)
-    return tuple(f"{value + 0.0:.{decimals}f}".replace("-", MINUS) for value in np.round(values, decimals).tolist())
+    return tuple(in_format(value, f".{decimals}f") for value in np.round(values, decimals).tolist())
 
 
 def power_of_ten(greatest: float) -> int:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from davinci_forces.report.changes import Change, StatedValue, changes
-from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Table, literal
+from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Table, in_format, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.parts import paper_or_screen, section_of
@@ -36,7 +36,7 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
     )
     if changed:
         rows = [
-            (literal(c.key), literal(_text(c.before)), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
+            (literal(c.key), literal(_text(c.before)), context.number(c.key), in_format(c.z or math.nan, "+.1f"))
             for c in changed[:MAX_ROWS]
         ]
         which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")

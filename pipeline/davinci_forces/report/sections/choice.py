@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.records import Choice, ModelSearch
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, in_format, literal
 from davinci_forces.report.content.marks import Points
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import explanation, section_of
@@ -37,12 +37,12 @@ def search_tables(context: Context) -> Iterator[Block]:
             continue
         columns = search.step, search.step_cutoff, search.step_lag, search.step_ridge, search.parameters, search.score
         rows = tuple(
-            (literal(str(step)), f"{cutoff:g}", f"{1e3 * lag:g}", f"{ridge:g}", str(parameters), f"{score:.4f}")
-            for step, cutoff, lag, ridge, parameters, score in zip(*columns, strict=True)
+            (literal(str(step)), f"{cutoff:g}", in_format(1e3 * lag, "g"), f"{ridge:g}", str(count), f"{score:.4f}")
+            for step, cutoff, lag, ridge, count, score in zip(*columns, strict=True)
         )
         rows, last = rows[: search.chosen_step + 1], len(search) - 1
         end = f" A further step would reach {search.score[last]:.4f}, which is not clearly less."
-        caption = f"{title(search.joint)}, {search.structure}: relative error after each step of the search."
+        caption = f"{title(search.joint)}, {search.structure}: relative residual after each step of the search."
         caption += end if search.chosen_step < last else " No further step reduced the error."
         yield Table(caption, header, rows, f"search-{search.joint}", "lrrrrr")
 
@@ -60,7 +60,9 @@ def best_rows(choice: Choice) -> list[int]:
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of the candidates in these rows of a choice; the chosen one is bold."""
     header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Physical")
-    caption += " Errors are relative. Physical: whether the inertia is positive definite along the trajectories."
+    caption += (
+        " Errors: relative residuals, with noise. Physical: the inertia is positive definite along all trajectories."
+    )
     cells = []
     for i in rows:
         name, physical = str(choice.candidate[i]), "yes" if choice.physical[i] else "no"
@@ -82,9 +84,9 @@ def figure(choice: Choice) -> Figure:
     finite = np.isfinite(choice.over_periods)
     repeated = (Points(size[finite], choice.over_periods[finite], "periods left out", "green"),) if finite.any() else ()
     caption = (
-        "Relative error of every candidate over its number of parameters, on fitted data and on data that were left "
-        "out."
+        "Relative residual, noise included, of every candidate over its number of parameters: on fitted data, and on "
+        "data that were left out."
     )
-    alt = "Relative error over number of parameters: falling on fitted data, but not always on data left out."
-    panels = (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),)
+    alt = "Relative residual over number of parameters: falling on fitted data, but not always on data left out."
+    panels = (Panel("Candidates", "parameters", "relative residual", (*marks, *repeated)),)
     return Figure(caption, alt, panels, label="choice-figure", height=46)

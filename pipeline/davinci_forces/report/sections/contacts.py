@@ -24,13 +24,15 @@ def section(context: Context) -> Iterator[Block]:
         yield Prose(explanation("contacts", levels=alarm_levels(context)))
         yield peaks(context, contacts)
         yield from by_time(context, contacts)
+        states_some = any(contact.stated.any() for contact in contacts)
+        outside = " outside the windows that the study states" if states_some else ", as the study states no window"
         caption = (
             f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
             "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Peak: to "
             "compare with the largest reading of a gauge. Middle half: the mean over the middle half of the time from "
             "onset to release, to compare with a steady reading. Impulse: of the stated window, or from onset to "
             "release. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below "
-            "the alarm level; “found” for a contact outside the windows that the study states, and “small” if its peak "
+            f"the alarm level; “found” for a contact{outside}, and “small” if its peak "
             "is below twice the alarm level, so that it may be an error of the model."
         )
         header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Middle half", "Impulse", "Verdict")

@@ -8,9 +8,9 @@ import numpy as np
 
 from davinci_forces.records import TipContact, TipForce, Track
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal, message
 from davinci_forces.report.content.marks import Line
-from davinci_forces.report.content.number import MINUS
+from davinci_forces.report.content.number import in_format
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import F, first_on_paper, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import truth_level
@@ -81,7 +81,7 @@ def effects(context: Context) -> Iterator[Table]:
             for effect, symbols, terms in EFFECTS:
                 of_effect = [(term, context.number(key, 3)) for term, key in keys.items() if re.match(terms, term)]
                 cells = of_effect or [(terms.replace("|", ", "), "not in the model")]
-                rows += [(title(joint), effect, symbols.format(**parameters), *cell) for cell in cells]
+                rows += [(title(joint), effect, message(symbols.format(**parameters)), *cell) for cell in cells]
     if rows:
         rows.append(("Motors", "rotor inertia", "see truth.toml", "part of the inertia", "–"))
         rows.append(("Motors", "windings, limits of current and voltage", "see truth.toml", WITHOUT_TERM, "–"))
@@ -185,7 +185,7 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
     """One row a push."""
     rows = []
     for contact, i, push in pairs:
-        true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
+        true = (in_format(x, ".3g") for x in force_of(push))
         numbers = context.numbers(f"tip.{contact.log}.{i + 1}", F)
         worst = f"{max(errors_in_deviations(contact, i, push)):.1f}"
         rows.append((literal(contact.log), str(i + 1), *true, *numbers, worst))

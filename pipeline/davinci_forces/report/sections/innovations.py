@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
-from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, in_format, literal
 from davinci_forces.report.content.marks import AnyMark, Line
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections import parts
@@ -111,7 +111,7 @@ def figure(context: Context, e: Explanation) -> Figure:
         *(periodogram(w, of) for w, of in tested),
         *(with_motion(moved[field], of) for field, of in INNOVATION_FIELDS if field in moved),
     )
-    firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
+    firsts = " and ".join(in_format(w.acf1, ".2f") for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
     caption = (
         f"{name}, the worst run of this joint: innovations, their autocorrelation, their cumulative periodogram "
         "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "

@@ -1,16 +1,26 @@
 """The methods behind the numbers, with their equations."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 from pathlib import Path
 from textwrap import fill
 
 from davinci_forces.files import read_bytes, text_of
-from davinci_forces.records import KINDS, LogSummary, Trajectory
+from davinci_forces.records import KINDS, Fit, LogSummary, Weight
 from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
-from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import chapters, of_joint, section_of, trust
+from davinci_forces.report.context import Context, count, estimator_name
+from davinci_forces.report.sections.parts import (
+    chapters,
+    explanation,
+    grade_of_mass,
+    is_of_link,
+    of_joint,
+    section_of,
+    trust,
+)
 from davinci_forces.report.verdicts import percent, thresholds
 
 BIBLIOGRAPHY = Path(__file__).with_name("references.bib")
@@ -62,43 +72,75 @@ def reference(entry: str) -> str:
 def paragraph_for_paper(context: Context) -> str:
     """A paragraph on the method with this study's numbers, for a paper."""
     settings, robot = context.study.settings, context.study.robot
-    logs = {log for fit in context.own_fits() for log in fit.logs}
-    summaries = [summary for summary in context.catalogue.records(LogSummary) if summary.log in logs]
-    rates = " to ".join(dict.fromkeys(f"{rate:.4g}" for rate in sorted(s.rate for s in summaries)))
-    averaged = ", averaged over periods" if context.catalogue.records(Trajectory) else ""
+    fits = {fit.key: fit for joint in robot.joints if (fit := context.shown_fit(joint.name)) is not None}.values()
+    together = [
+        f" One model with {len(fit)} parameters describes {as_list(context.efforts_of(fit))} together."
+        for fit in fits if any(map(is_of_link, fit.phi))
+    ]  # fmt: skip
     slowest = f"the slowest that shows 90 % of a push of 1 s at most {settings.delay:g} s late"
-    walk = f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})"
-    scores = "; ".join(filter(None, (unseen_score(context, joint.name) for joint in robot.joints))) or "none"
-    logs_in_words = count(len(logs), "simulated log" if context.study.simulated else "recording")
-    kind = "a simulated arm" if context.study.simulated else "an arm"
-    return fill(
-        f"External efforts of {kind} ({robot.title}) were estimated from motor efforts and joint positions with "
-        f"davinci-forces {context.provenance.version} (code {context.provenance.code}). Parameters were identified "
-        f"from {logs_in_words} ({', '.join(sorted(logs))}) of "
-        f"{sum(s.duration for s in summaries):.0f} s in all at {rates} Hz{averaged}; the model was "
-        f"{'selected by cross-validation over blocks of path' if settings.fit == CHOSEN else settings.fit}. Model, "
-        "error (root mean square, beyond noise) on unseen data, and level below which 99 % of free-motion samples "
-        f"stay: {scores}. For the errors, effort and prediction passed one low-pass of {settings.lowpass:g} "
-        "Hz without delay. The external effort was tracked by an extended Kalman filter with position, velocity and "
-        f"external effort as states, the last as a random walk {walk}. Standard errors (±) allow for "
-        "autocorrelation, by restricted likelihood (Patterson and Thompson, 1971) or blocks (Künsch, 1989).",
-        88, break_on_hyphens=False,
-    )  # fmt: skip
+    masses = [
+        f"{weight.stated_mass:g} kg was estimated as {context.number(f'weight.{weight.log}.mass', 2)}"
+        + " (and gave a torque constant in use)" * (grade_of_mass(context, weight)[1] == "taken")
+        for weight in context.catalogue.records(Weight) if isfinite(weight.stated_mass)
+    ]  # fmt: skip
+    paragraph = explanation(
+        "paper",
+        arm=f"{'a simulated arm' if context.study.simulated else 'an arm'} ({robot.title})",
+        efforts=efforts_in_words(context),
+        version=f"{context.provenance.version} (code {context.provenance.code})",
+        data="; and from ".join(data_in_words(context, [*fits])),
+        chosen="selected by cross-validation over blocks of path" if settings.fit == CHOSEN else settings.fit,
+        scores="; ".join(filter(None, (unseen_score(context, joint.name) for joint in robot.joints))) or "none",
+        together="".join(together).replace("_", " "),
+        lowpass=f"{settings.lowpass:g}",
+        walk=f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})",
+        masses=f" Of known masses, {as_list(masses)}." if masses else "",
+    )
+    return fill(paragraph, 88, break_on_hyphens=False)
+
+
+def efforts_in_words(context: Context) -> str:
+    """What the efforts of the joints come from."""
+    by_current = context.study.joints_by_current
+    return ", ".join(dict.fromkeys(
+        "motor currents and stated torque constants" if joint in by_current
+        else "motor currents in A" if joint.effort else "motor efforts" for joint in context.study.robot.joints
+    ))  # fmt: skip
+
+
+def data_in_words(context: Context, fits: Sequence[Fit]) -> Iterator[str]:
+    """What models were fitted to: all motion or averaged periods, with their rate, the used time, and the periods."""
+    kind = "simulated log" if context.study.simulated else "recording"
+    for is_averaged, data in ((False, "all motion in"), (True, "averages over the whole periods of")):
+        names = {log for fit in fits if bool(fit.periods) is is_averaged for log in fit.logs}
+        seconds, rates, motions = 0.0, list[float](), dict[str, list[str]]()
+        for summary in (summary for summary in context.catalogue.records(LogSummary) if summary.log in names):
+            used, motion, key = summary.duration, "no period", f"period.{summary.log}"
+            if key in context.results:
+                periods = round(context.results[f"{key}.periods"].value)
+                used = periods * context.results[key].value if is_averaged else used
+                motion = f"{count(periods, 'period')} of {context.number(key, 4, std=None)}"
+            seconds += used
+            rates.append(summary.rate)
+            motions.setdefault(motion, []).append(summary.log)
+        if rates:
+            rate = " to ".join(dict.fromkeys(f"{of(rates):.4g}" for of in (min, max)))
+            listed = "; ".join(f"{', '.join(sorted(logs))}: {motion}" for motion, logs in motions.items())
+            yield f"{data} {count(len(rates), kind)} at {rate} Hz, {seconds:.0f} s in all ({listed})"
 
 
 def unseen_score(context: Context, joint: str) -> str:
-    """The model that a joint's effort was judged with, its error on the worst unseen log, and its detection level."""
-    trusted = trust(context, joint)
-    if (p := trusted.prediction) is None:
+    """The model that a joint's effort was judged with, its error on the worst unseen log, its levels and coverage."""
+    trusted, fit = trust(context, joint), context.shown_fit(joint)
+    if (p := trusted.prediction) is None or fit is None:
         return ""
-    error, level = context.number(f"{p.prefix}.model_error", 2), ""
-    if trusted.space is not None:
-        level = f", level {context.number(f'{trusted.space.prefix}.detection_level', 2)}"
-    model = context.used_fit(joint)
-    if (used := context.used_record(joint)) is not None:
-        friction = ", ".join(name for name in of_joint(used, joint).values() if "friction" in name)
-        model = f"{used.structure}, {len(used)} parameters with {friction}, by {used.estimator}"
+    parts = [] if any(map(is_of_link, fit.phi)) else [count(len(fit), "parameter")]
+    parts += [as_list([name for name in of_joint(fit, joint).values() if "friction" in name]) or "no friction"]
+    parts += [] if fit.periods else [f"low-pass of {fit.cutoff[context.efforts_of(fit).index(joint)]:g} Hz"]
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
-    return (
-        f"{joint.replace('_', ' ')}: {model}; error {error} ({percent(trusted.share)} of the effort) on {where}{level}"
-    )
+    error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"
+    levels = ("threshold.{}.detection_level", "threshold.{}.alarm_level", "band.{}.coverage")
+    keys = {level.rpartition(".")[2].replace("_", " "): level.format(joint) for level in levels}
+    scores = [error, *(f"{name} {context.number(key, 2)}" for name, key in keys.items() if key in context.results)]
+    model = f"{fit.structure} model by {estimator_name(fit.estimator)} ({', '.join(parts)})"
+    return f"{joint.replace('_', ' ')}: {model}, {', '.join(scores)}"

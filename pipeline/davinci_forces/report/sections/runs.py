@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from davinci_forces.records import Diagnostic, Explanation, LogSummary, Signal, Track, first_of_each_kind
 from davinci_forces.records.forces import SMOOTHER, FilterNoise, FreeSpace
-from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
+from davinci_forces.report.content.inline import literal, message
 from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
 from davinci_forces.report.context import Context, count, label
 from davinci_forces.report.sections import parts
@@ -117,7 +118,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         every = clean == len(summaries)
         which = "Every log was" if every else f"{clean} of {count(len(summaries), 'log')} were"
         yield Verdict("good" if every and not diagnostics else "info", f"{which} read without a remark.")
-    yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
+    yield from (Verdict("warn", f"**{literal(log)}**: {message('; '.join(texts))}.") for log, texts in remarked.items())
     stated = "the rate stated in study.toml"  # of a log without a clock
     signals = context.catalogue.records(Signal)
     methods = sorted({(stated if context.study.log(s.log).rate else s.method, s.velocity) for s in signals})
@@ -132,13 +133,13 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
             "Remarks of the file readers and of the stages `ingest`, `resample` and `average`, the first of each kind; "
             "`davinci-forces guide messages` explains them:"
         )
-        first = tuple(literal(text) for _, text in first_of_each_kind(of_stages))
+        first = tuple(message(text) for _, text in first_of_each_kind(of_stages))
         yield Bullets(first)
         if len(first) < len(of_stages):
-            all_of_them = Bullets(tuple(literal(text) for _, text in of_stages))
+            all_of_them = Bullets(tuple(message(text) for _, text in of_stages))
             yield OnScreen(f"All {len(of_stages)} remarks", "all-remarks", (all_of_them,))
     of_the_tip = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("resolve", "sense")]
-    if left_out := tuple(literal(text) for diagnostic in of_the_tip for text in diagnostic.text):
+    if left_out := tuple(message(text) for diagnostic in of_the_tip for text in diagnostic.text):
         yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(left_out),))
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.report.content import Block, Prose, Table, literal
+from davinci_forces.report.content import Block, Prose, Table, literal, message
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import section_of
 from davinci_forces.simulation.thesis import chapters, in_words, numbers
@@ -20,11 +20,11 @@ def section(context: Context) -> Iterator[Block]:
     compared = numbers(results)
     yield Prose(in_words(compared))
     for chapter in chapters():
-        rows = tuple((literal(row.item), literal(row.shows), row.here, literal(row.differs)) for row in chapter.rows)
+        rows = tuple((literal(row.item), literal(row.shows), row.here, message(row.differs)) for row in chapter.rows)
         yield Table(f"Chapter {chapter.title}.", ("Item", "Shows", "Here", "Differs"), rows, align="llll")
     header = ("Item", "Numbers", "Printed", "Here", "Why")
     lines = tuple(
-        (literal(x.item), literal(x.name), x.printed_text, x.here_text, literal(x.why if x.differ.any() else ""))
+        (literal(x.item), literal(x.name), *map(message, (x.printed_text, x.here_text, x.why * bool(x.differ.any()))))
         for x in compared
     )
     yield Table("Numbers of the thesis, as printed and here.", header, lines, align="lllll")

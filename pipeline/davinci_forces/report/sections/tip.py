@@ -11,9 +11,9 @@ from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Equation, Figure, Figure3D, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, Line, Line3D, Points3D
-from davinci_forces.report.content.number import MINUS, Number
+from davinci_forces.report.content.number import Number, in_format
 from davinci_forces.report.context import Context, label, name_in_sentence
-from davinci_forces.report.sections.parts import F, converged_rows, section_of, spans, strokes
+from davinci_forces.report.sections.parts import F, converged_rows, explanation, section_of, spans, strokes
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 PATH_POINTS = 600  # points drawn of the path in space
@@ -25,13 +25,7 @@ def section(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The force at the tip of every log in which all joints that carry it move."""
     tool = context.study.robot.tool
     shaft = f" The shaft of the tool is taken to be {Number(tool.length, 'm')} long." if tool else ""
-    yield Prose(
-        "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
-        "from the external efforts of the three joints, at times when all of them move. Two assumptions are "
-        "made: nothing but the tip is touched, and joints beyond these three stand at zero, as in a straight wrist."
-        f"{shaft} The efforts are those of the smoother, which has no delay. Their covariance $C_tau$ contains the "
-        "squares of their standard deviations."
-    )
+    yield Prose(explanation("tip", shaft=shaft))
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
         "force is the inverse of the transposed Jacobian times external effort; its covariance follows from that of "
@@ -79,11 +73,11 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     for contact in contacts:
         for i in range(len(contact)):
             prefix = f"tip.{contact.log}.{i + 1}"
-            weak = ", ".join(f"{round(x[i], 1) + 0.0:.1f}" for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+            weak = ", ".join(in_format(x[i], ".1f") for x in (contact.weak_x, contact.weak_y, contact.weak_z))
             remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
             window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s{remark}"
             numbers = *context.numbers(prefix, (*F, "peak")), context.number(f"{prefix}.sigma_1", 2)
-            rows.append((literal(contact.log), window, *numbers, f"({weak})".replace("-", MINUS)))
+            rows.append((literal(contact.log), window, *numbers, f"({weak})"))
     caption = (
         "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
         "along the least certain direction, which is the last column. “Found” marks a window that the study does not "

@@ -11,7 +11,7 @@ from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import explanation, grade_of_mass, run_cells, section_of
-from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, percent
+from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, doubt_of_mass, percent
 
 
 @section_of("Attached masses", "weight")
@@ -100,7 +100,8 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",
         "right": f", and {stated} The scale, {scale}, agrees with 1.",
     }
-    return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
+    named = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{doubt_of_mass(weight)}"
+    return Verdict(level, named + follows[why])
 
 
 def turned_joint(weight: Weight) -> str:

@@ -9,8 +9,8 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, Fit, Identifiability, Prediction, Residual
 from davinci_forces.records.record import as_list, slug
 from davinci_forces.report.content import Block, Bullets, Cell, Equation, OnScreen, Prose, Section, Table, Verdict
-from davinci_forces.report.content.inline import literal
-from davinci_forces.report.content.number import Number
+from davinci_forces.report.content.inline import literal, message
+from davinci_forces.report.content.number import Number, in_format
 from davinci_forces.report.context import Context, fit_name, name_in_sentence, title
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.details import convergence, correlations, estimators, friction_maps
@@ -95,7 +95,7 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
     before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
     after = context.number(f"{worst.prefix}.relative_error", 3)
-    where = f"Of the logs that were not fitted, its relative error (noise included) is largest in {literal(worst.log)}"
+    where = f"Of the logs not fitted, its relative residual (noise included) is largest in {literal(worst.log)}"
     return f"{text} {where}: {after}, and {before} by the plain model."
 
 
@@ -111,7 +111,7 @@ def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:
         value, std, _ = min(clear or negative, key=lambda each: each[0] + NORMAL_95 * each[1])
         who = ", ".join(dict.fromkeys(estimator for *_, estimator in clear or negative))
         follows = "which is physically impossible" if clear else "which cannot be distinguished from zero"
-        text = f"**{literal(name)}** is negative ({value:.2g} ± {std:.1g}), {follows}, by {who}."
+        text = f"**{literal(name)}** is negative ({Number(value, std=std, digits=2)}), {follows}, by {who}."
         yield Verdict("warn" if clear else "info", text)
 
 
@@ -148,7 +148,7 @@ def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str =
     z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
     values = (context.number(f"{key}{part}", 2, unit="") for part in ("", ".std_noise", ".std_model"))
     unit = format_unit(fit.unit[i]) or "–"
-    return symbol, literal(name.removesuffix(suffix)), unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"
+    return symbol, literal(name.removesuffix(suffix)), unit, *values, in_format(z, ".1f")
 
 
 def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
@@ -188,7 +188,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
     diagnostics = context.catalogue.select(Diagnostic, stage="fit", subject=group)
-    remarks = tuple(literal(text.replace("`", "")) for diagnostic in diagnostics for text in diagnostic.text)
+    remarks = tuple(message(text) for diagnostic in diagnostics for text in diagnostic.text)
     more = (
         *([Bullets(remarks)] if remarks else []),
         *estimators(context, next((fit for fit in fits if fit.estimator == "lse"), fits[0])),
@@ -202,6 +202,6 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
 def unidentified_parameters(context: Context, joint: str, is_used: bool) -> Iterator[Verdict]:
     """Parameters of the plain model that the identification logs of a joint do not determine."""
     for record in context.catalogue.select(Identifiability, group=joint):
-        if text := "; ".join(map(literal, (*record.together, *record.not_seen))):
+        if text := "; ".join(map(message, (*record.together, *record.not_seen))):
             text = f"{text[:1].upper()}{text[1:]}" if is_used else f"In the plain model, {text}"
             yield Verdict("info", f"{text}. {record.advice}.")

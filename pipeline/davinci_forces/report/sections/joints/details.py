@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Fit, FrictionMap, Identifiability, Residual, SwarmSearch
-from davinci_forces.report.content import Block, Figure, Panel, Prose
+from davinci_forces.report.content import Block, Figure, Panel, Prose, in_format
 from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
 from davinci_forces.report.context import Context, estimator_name, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import run_name
@@ -136,4 +136,4 @@ def friction_curves(m: FrictionMap) -> Iterator[Line]:
 def friction_in_words(m: FrictionMap) -> str:
     """State the mean friction in either direction."""
     sides = [float(m.tau_friction[side].mean()) if side.any() else 0.0 for side in (m.dq < 0, m.dq > 0)]
-    return f"{sides[0]:.2g} on average backwards and {sides[1]:.2g} forwards."
+    return f"{in_format(sides[0], '.2g')} on average backwards and {in_format(sides[1], '.2g')} forwards."

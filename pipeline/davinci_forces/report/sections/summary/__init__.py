@@ -8,8 +8,9 @@ import numpy as np
 from davinci_forces.records import Contact, Stiffness, Threshold, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
-from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal, message
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
+from davinci_forces.report.content.number import in_format
 from davinci_forces.report.context import Context, count, label, name_in_sentence, title
 from davinci_forces.report.results import unit_of
 from davinci_forces.report.sections import parts
@@ -30,7 +31,7 @@ ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, a
 def section(context: Context) -> Iterator[Block]:
     """The answer on one page."""
     for task, failed in context.provenance.failures.items():
-        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
+        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {message(failed)}")
     trusts = [parts.trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
@@ -49,7 +50,7 @@ def section(context: Context) -> Iterator[Block]:
         alt = f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}."
         columns, height = 2 if len(panels) > MAX_IN_COLUMN else 1, room / min(len(panels), MAX_IN_COLUMN)
         drawn = tuple(in_column(panels))
-        yield Figure(caption(contacts, panels), alt, drawn, "answer-figure", columns=columns, height=height)
+        yield Figure(caption(context, contacts, panels), alt, drawn, "answer-figure", columns=columns, height=height)
     yield trust_table(context, trusts)
     yield Prose(rule_in_words(trusts))
     looks = first_looks_in_order(context, trusts)
@@ -79,17 +80,22 @@ def rule_in_words(trusts: list[Trust]) -> str:
     return text + narrow * any(trust.narrow and trust.level == "good" for trust in trusts)
 
 
-def caption(contacts: list[Contact], panels: list[Panel]) -> str:
+def caption(context: Context, contacts: list[Contact], panels: list[Panel]) -> str:
     """The caption of the figure, which names the log if all panels are of one, as `in_column` then does not."""
     level = "Grey: the level that 95 % of the samples in free space stay below, not an error band."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
     which *= len({contact.log for contact in contacts}) > 1
+    logs = [panel.title.rpartition(", ") for panel in panels]
+    elsewhere = [joint for joint, _, log in logs if context.study.log(log).role != "contact"]
+    which += f"{as_list(elsewhere)}: in no contact log, so the worst run in free space is shown. " * bool(elsewhere)
     where = f" in {literal(one_log(panels))}" if one_log(panels) else ""
     is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
     shaded = ", contact windows shaded" if is_shaded else ""
-    return f"External effort of each joint{where}{shaded}. {which}{level}"
+    has_dots = any(isinstance(mark, Points) for panel in panels for mark in panel.marks)
+    dots = " Dots: peaks, beyond the curve by half of what smoothing takes off them." * has_dots
+    return f"External effort of each joint{where}{shaded}. {which}{level}{dots}"
 
 
 def one_log(panels: list[Panel]) -> str:
@@ -223,13 +229,13 @@ def named_peaks(track: Track, contact: Contact) -> Points:
         places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
     t, peaks, width = track.t[places], contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     largest = [(np.abs(peaks[np.abs(t - at) < width]) <= abs(p)).all() for at, p in zip(t, peaks, strict=True)]
-    names = tuple(f"{p:+.3g}".replace("-", "−") if named else "" for named, p in zip(largest, peaks, strict=True))
+    names = tuple(in_format(p, "+.3g") if named else "" for named, p in zip(largest, peaks, strict=True))
     return Points(t, peaks, "", "black", names=names)
 
 
 def spoken(contact: Contact) -> str:
     """The peaks of a log in words, for those who cannot see the figure."""
-    peaks = ", ".join(f"{p:+.3g}" for p in contact.peak)
+    peaks = ", ".join(in_format(p, "+.3g") for p in contact.peak)
     return f"{contact.joint.replace('_', ' ')} peaks at {peaks} {unit_of(contact, 'peak')}"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from davinci_forces.records import Diagnostic, PathShare, Prediction, Record, Spectrum, Track, Weight
 from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
-from davinci_forces.report.content import literal
+from davinci_forces.report.content import literal, message
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import grade_of_mass, of_joint
 from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
@@ -49,7 +49,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     for stage, text in first_of_each_kind(warnings):
         by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
         weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size
-        yield weight, literal(text.replace("`", ""))
+        yield weight, message(text)
 
 
 def omitted_share(spectrum: Spectrum) -> float:

@@ -10,7 +10,7 @@ from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass, hand_name
-from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, percent, stiffness_level
+from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, doubt_of_mass, percent, stiffness_level
 from davinci_forces.study.review import STUDY
 
 MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
@@ -96,7 +96,7 @@ def masses(context: Context) -> Iterator[str]:
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
         level, why = grade_of_mass(context, weight)
         stated += ", which gave a torque constant in use: no test of it" * (why == "taken")
-        yield f"{WORDS.get(level, '')} **{literal(weight.log)}**: mass {mass}{stated}".strip()
+        yield f"{WORDS.get(level, '')} **{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}".strip()
 
 
 def stiffnesses(context: Context) -> Iterator[str]:
