@@ -498,11 +498,17 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     log = replace(full.study.logs[0], channels=(Source("hand_roll.i", "current", "current"),))
     about = replace(full, catalogue=records, study=replace(full.study, logs=(log, *full.study.logs[1:])))
     text = paragraph(about)
-    assert "from motor currents and stated torque constants, motor efforts and joint positions" in text
+    assert "from motor currents, stated torque constants, motor efforts and joint positions" in text
     together = "describes hand roll, hand pitch and instrument slide together"
     assert f"One model with {len(arm)} parameters {together}." in text
     assert f"({len(arm)} parameters" not in text
     assert [cutoff for cutoff in (8, 9, 10) if f"low-pass of {cutoff} Hz" in text] == [8, 9, 10]
+    alone = replace(chosen, structure="coupled", phi=arm.phi[: len(chosen)])  # through links, of one joint
+    fits = [alone if fit is chosen else fit for fit in full.catalogue.records(Fit)]
+    records = Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind))
+    text = paragraph(replace(full, catalogue=records))
+    assert f"hand roll: coupled model by {chosen.estimator} ({len(chosen)} parameters, " in text
+    assert "together" not in text
 
 
 def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):

@@ -16,7 +16,6 @@ from davinci_forces.report.sections.parts import (
     chapters,
     explanation,
     grade_of_mass,
-    is_of_link,
     of_joint,
     section_of,
     trust,
@@ -75,7 +74,7 @@ def paragraph_for_paper(context: Context) -> str:
     fits = {fit.key: fit for joint in robot.joints if (fit := context.shown_fit(joint.name)) is not None}.values()
     together = [
         f" One model with {len(fit)} parameters describes {as_list(context.efforts_of(fit))} together."
-        for fit in fits if any(map(is_of_link, fit.phi))
+        for fit in fits if len(context.efforts_of(fit)) > 1
     ]  # fmt: skip
     slowest = f"the slowest that shows 90 % of a push of 1 s at most {settings.delay:g} s late"
     masses = [
@@ -103,7 +102,7 @@ def efforts_in_words(context: Context) -> str:
     """What the efforts of the joints come from."""
     by_current = context.study.joints_by_current
     return ", ".join(dict.fromkeys(
-        "motor currents and stated torque constants" if joint in by_current
+        "motor currents, stated torque constants" if joint in by_current
         else "motor currents in A" if joint.effort else "motor efforts" for joint in context.study.robot.joints
     ))  # fmt: skip
 
@@ -134,9 +133,10 @@ def unseen_score(context: Context, joint: str) -> str:
     trusted, fit = trust(context, joint), context.shown_fit(joint)
     if (p := trusted.prediction) is None or fit is None:
         return ""
-    parts = [] if any(map(is_of_link, fit.phi)) else [count(len(fit), "parameter")]
+    efforts = context.efforts_of(fit)
+    parts = [] if len(efforts) > 1 else [count(len(fit), "parameter")]
     parts += [as_list([name for name in of_joint(fit, joint).values() if "friction" in name]) or "no friction"]
-    parts += [] if fit.periods else [f"low-pass of {fit.cutoff[context.efforts_of(fit).index(joint)]:g} Hz"]
+    parts += [] if fit.periods else [f"low-pass of {fit.cutoff[efforts.index(joint)]:g} Hz"]
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
     error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"
     levels = ("threshold.{}.detection_level", "threshold.{}.alarm_level", "band.{}.coverage")
