@@ -143,11 +143,11 @@ def by_joint(context: Context, weight: Weight) -> Table:
     )
     caption = (
         f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at its position and "
-        "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass; the "
-        "standard error of the mass includes it, or is 0 where a tare is subtracted, as it cancels."
-        f"{together if len(rows) > 1 else ''} Also the offset of the day, or – where a constant effort cannot be told "
-        "from the mass, which it then shifts, and "
-        "the root mean squares of the residual with the mass and of the model's error in free motion."
+        "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass, which the "
+        "standard error of the mass includes; 0 where a tare is subtracted, as it cancels."
+        f"{together if len(rows) > 1 else ''} Offset: that of the day; – where a constant effort cannot be told from "
+        "the mass, which it then shifts. Residual: what is left with the mass, root mean square. Free motion: the "
+        "model's error there, likewise."
     )
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")
     return Table(caption, header, rows, f"weight-joints-{weight.log}", "lrrrrrr")
