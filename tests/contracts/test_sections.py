@@ -472,15 +472,13 @@ def test_the_paragraph_for_a_paper_names_filter_and_smoother_the_data_and_each_j
 
 
 def test_the_paragraph_counts_of_averaged_logs_whole_periods_alone(full: Context):
-    about = replace(full, study=replace(full.study, settings=replace(full.study.settings, fit="independent.lse")))
-    used = [about.shown_fit(joint.name) for joint in about.study.robot.joints]
-    assert all(fit.periods for fit in used)
-    period = {name: full.results[f"period.{name}"].value for fit in used for name in fit.logs}
-    number = {name: full.results[f"period.{name}.periods"].value for name in period}
-    seconds = sum(period[name] * number[name] for name in period)
+    three = {"period.roll.periods": replace(full.results["period.roll.periods"], value=3.0)}
+    study = replace(full.study, settings=replace(full.study.settings, fit="independent.lse"))
+    about = replace(full, study=study, results=Results(full.results | three))
+    assert all(about.shown_fit(joint.name).periods for joint in study.robot.joints)
     text = paragraph(about)
-    data = f"averages over the whole periods of {len(period)} simulated logs at 50 Hz, {seconds:.0f} s in all"
-    assert f"identified from {data} (again, pitch, roll, slide: 5 periods of 2.000 s)" in text
+    data = "averages over the whole periods of 4 simulated logs at 50 Hz, 36 s in all"
+    assert f"identified from {data} (roll: 3 periods of 2.000 s; again, pitch, slide: 5 periods of 2.000 s)." in text
     assert "low-pass of" not in text.partition("Results")[2].partition("For the errors")[0]
     assert "The model was independent.lse." in text
 
@@ -856,6 +854,13 @@ def test_new_keys_beyond_those_listed_are_counted(full: Context):
     *shown, last = listing.text.splitlines()
     assert shown == keys[:300]
     assert last == f"and {len(keys) - len(shown)} more"
+
+
+def test_a_change_of_the_baseline_has_a_true_minus_and_no_sign_without_a_standard_error(full: Context):
+    known = Change("a", StatedValue(3.0, 0.3), StatedValue(2.0, 0.4))
+    unknown = Change("b", StatedValue(1.0), StatedValue(2.0))
+    [table] = [b for b in baseline_section.blocks(full, {}, [known, unknown]) if isinstance(b, Table)]
+    assert sorted(row[-1] for row in table.rows) == ["–", "−2.0"]
 
 
 def test_measurements_beyond_those_on_page_one_are_counted(full: Context):
