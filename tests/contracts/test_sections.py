@@ -497,6 +497,10 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     about = replace(full, catalogue=records, study=replace(full.study, logs=(log, *full.study.logs[1:])))
     text = paragraph(about)
     assert "from motor currents, stated torque constants, motor efforts and joint positions" in text
+    others = Catalogue(
+        lambda kind: [f for f in fits if f.group == "hand_roll"] if kind is Fit else records.records(kind)
+    )
+    assert "from motor currents, stated torque constants and joint" in paragraph(replace(about, catalogue=others))
     together = "describes hand roll, hand pitch and instrument slide together"
     assert f"One model with {len(arm)} parameters {together}." in text
     assert f"({len(arm)} parameters" not in text
@@ -505,7 +509,7 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     fits = [alone if fit is chosen else fit for fit in full.catalogue.records(Fit)]
     records = Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind))
     text = paragraph(replace(full, catalogue=records))
-    assert f"hand roll: coupled model by {chosen.estimator} ({len(chosen)} parameters, " in text
+    assert f"hand roll: coupled model by ridge ({len(chosen)} parameters, " in text
     assert "together" not in text
 
 

@@ -6,12 +6,13 @@ from math import isfinite
 from pathlib import Path
 from textwrap import fill
 
+from davinci_forces.estimators import title_of
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.records import KINDS, Fit, LogSummary, Weight
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
-from davinci_forces.report.context import Context, count, estimator_name
+from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import (
     chapters,
     explanation,
@@ -99,11 +100,12 @@ def paragraph_for_paper(context: Context) -> str:
 
 
 def efforts_in_words(context: Context) -> str:
-    """What the efforts of the joints come from."""
-    by_current = context.study.joints_by_current
+    """What the efforts of the joints that have a fit come from."""
+    by_current, joints = context.study.joints_by_current, context.study.robot.joints
     return ", ".join(dict.fromkeys(
         "motor currents, stated torque constants" if joint in by_current
-        else "motor currents in A" if joint.effort else "motor efforts" for joint in context.study.robot.joints
+        else "motor currents in A" if joint.effort else "motor efforts"
+        for joint in joints if context.shown_fit(joint.name) is not None
     ))  # fmt: skip
 
 
@@ -142,5 +144,5 @@ def unseen_score(context: Context, joint: str) -> str:
     levels = ("threshold.{}.detection_level", "threshold.{}.alarm_level", "band.{}.coverage")
     keys = {level.rpartition(".")[2].replace("_", " "): level.format(joint) for level in levels}
     scores = [error, *(f"{name} {context.number(key, 2)}" for name, key in keys.items() if key in context.results)]
-    model = f"{fit.structure} model by {estimator_name(fit.estimator)} ({', '.join(parts)})"
+    model = f"{fit.structure} model by {title_of(fit.estimator)} ({', '.join(parts)})"
     return f"{joint.replace('_', ' ')}: {model}, {', '.join(scores)}"
