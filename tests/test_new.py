@@ -18,12 +18,13 @@ from davinci_forces.robots.robot import Kind
 from davinci_forces.study import reading
 from davinci_forces.study.holding import Holding
 from davinci_forces.study.joint_names import by_joint_names
-from davinci_forces.study.roles import GUESSED, Evidence, roles_of
+from davinci_forces.study.roles import GUESSED, WIDER, Evidence, roles_of
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.simulation.six_joints import write
 from tests.test_runs import call
 
 RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
+UNKNOWN_NAME = f"{GUESSED}, as no word of its name is known: "
 DEMO = Path(__file__).parents[1] / "raw" / "davinci-demo"
 
 
@@ -447,10 +448,36 @@ def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
 
 WORDS_OF_ROLES = {
     "identification": ("sysid_01", "Ident roll", "train"),
-    "validation": ("verification", "cross_val", "no contact 3", "frei", "tare", "other path"),
-    "contact": ("pull_test", "with_force", "Kontakt", "stoss2", "poke3", "TouchTip", "collision"),
-    "weight": ("hang_100g", "load100", "Gewicht", "payload0p25kg"),
-    "friction": ("constVel", "friction_map"),
+    "validation": (
+        "verification",
+        "cross_val",
+        "no contact 3",
+        "frei",
+        "tare",
+        "other path",
+        "Kreuzvalidierung",
+        "roll_pruefung",
+        "Überprüfung_2",
+        "PRU\u0308FUNG",
+        "validación",
+        "ohne_last",
+        "sans contact",
+        "berührung/kontaktfrei",
+        "verifica",
+    ),
+    "contact": (
+        "pull_test",
+        "with_force",
+        "Kontakt",
+        "stoß2",
+        "poke3",
+        "TouchTip",
+        "collision",
+        "Berührung",
+        "contatto",
+    ),
+    "weight": ("hang_100g", "load100", "Gewicht", "payload0p25kg", "vægt", "poids2"),
+    "friction": ("constVel", "friction_map", "Haftreibung", "frottement"),
     "tissue": ("slide_silicone", "foam block 2", "PalpationA", "gelatin"),
 }
 
@@ -460,6 +487,40 @@ def test_words_of_several_laboratories_tell_the_role():
         for name in names:
             [said] = roles_of([Evidence(name, name, Holding(), slides=True)])
             assert said.role == role, name
+
+
+@pytest.mark.parametrize("names", [("anregung", "pruefung"), ("excitación", "prueba"), ("Excitation", "essai")])
+def test_the_excitation_identifies_and_the_check_validates_in_other_languages(tmp_path, names):
+    for scale, name in zip((1.0, 1.1), names, strict=True):  # the check reaches farther
+        t, q, dq = motion(1)
+        table(tmp_path / f"roll_{name}.csv", t, scale * q, scale * dq, effort(q, dq))
+    said = new(tmp_path)
+    assert GUESSED not in said
+    roles = {entry.name: entry.role for entry in reading.read(tmp_path).logs}
+    assert list(roles.values()) == ["identification", "validation"]
+
+
+@pytest.mark.parametrize("farther", [1.1, 1.5])
+def test_of_two_motions_that_reach_about_as_far_the_longer_in_whole_periods_identifies(tmp_path, farther):
+    t, q, dq = motion(1)
+    table(tmp_path / "b.csv", t, q, dq, effort(q, dq))
+    short = slice(3 * N // 4)  # three of the four periods
+    table(tmp_path / "a.csv", t[short], farther * q[short], farther * dq[short], effort(q, dq)[short])
+    said = new(tmp_path)
+    longest_identifies = farther < WIDER
+    roles = {entry.name: entry.role for entry in reading.read(tmp_path).logs}
+    assert roles == dict(zip("ab", ("validation", "identification")[:: 1 if longest_identifies else -1], strict=True))
+    why = "reaches hardly farther than that of b" if longest_identifies else "stays within that of a"
+    assert f"{UNKNOWN_NAME}its motion {why}, which identifies" in said
+
+
+def test_a_word_that_all_names_share_is_not_called_unknown(tmp_path):
+    for k in (1, 2):
+        t, q, dq = motion(1)
+        table(tmp_path / f"test_{k}.csv", t, q / k, dq / k, effort(q, dq))
+    said = new(tmp_path)
+    assert said.count(GUESSED) == 2
+    assert UNKNOWN_NAME not in said
 
 
 def test_the_word_that_tells_an_excitation_is_quoted_as_it_stands(tmp_path):
@@ -626,8 +687,8 @@ def test_a_role_that_values_tell_is_to_be_checked_where_another_log_moves_the_jo
     said = new(tmp_path / "all")
     roles = {entry.name: entry.role for entry in reading.read(tmp_path / "all").logs}
     assert roles == {"a": "identification", "b": "validation", "slide_unknown": "weight"}
-    assert f"{GUESSED}its motion repeats" in said
-    assert f"{GUESSED}its motion stays within that of a" in said
+    assert f"{UNKNOWN_NAME}its motion repeats" in said
+    assert f"{UNKNOWN_NAME}its motion stays within that of a" in said
     t, q, dq = motion(1)
     alone = new(table(tmp_path / "one" / "a.csv", t, q, dq, effort(q, dq)))
     assert "its motion repeats" in alone

@@ -9,7 +9,7 @@ import numpy as np
 from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.unexplained import smoothed_course
-from davinci_forces.maths.periods.repetition import repetition
+from davinci_forces.maths.periods.repetition import Repetition, repetition
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures, size
 from davinci_forces.robots.robot import Robot
@@ -18,6 +18,7 @@ from davinci_forces.study.joint_names import AT_MOTOR, by_joint_names, by_number
 from davinci_forces.study.names import is_time, stated_unit, symbol_of, words_of
 from davinci_forces.study.timing import MAX_CHANNELS, TimeGuess, has_clock, named_time, samples_of, timing_of
 
+PERIOD_TOLERANCE = 0.05  # periods that the last whole one may lack
 MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 
 
@@ -124,7 +125,14 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
     }  # fmt: skip
     return replace(
         holding, meanings=meanings, timing=timing, moving=moving, courses=courses, units=units,
-        repeats=again is not None and again.stop - again.start >= MIN_REPEATING_SHARE * len(q[joints[0]]),
+        repeating=step * _whole_periods(again, len(q[joints[0]])) if again else 0.0,
         steady=velocity is not None and columns.is_steady(velocity),
         ranges={joint: (float(values.min()), float(values.max())) for joint, values in q.items()},
     )  # fmt: skip
+
+
+def _whole_periods(repeat: Repetition, N: int) -> float:
+    """The samples in whole periods, 0 if the section that repeats is less than half of the N samples of a log."""
+    size = repeat.stop - repeat.start
+    periods = int(size / repeat.lag + PERIOD_TOLERANCE)
+    return periods * repeat.lag if size >= MIN_REPEATING_SHARE * N else 0.0

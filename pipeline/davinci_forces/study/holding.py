@@ -33,7 +33,7 @@ class Holding:
     robot: Robot | None = None  # whose joints the names name
     timing: TimeGuess = field(default_factory=TimeGuess)
     moving: tuple[int, ...] = ()  # joints, counted from 0
-    repeats: bool = False
+    repeating: float = 0.0  # [s] of the motion in whole periods; 0 if most of it does not repeat
     steady: bool = False
     ranges: dict[int, tuple[float, float]] = field(default_factory=dict)  # of the positions, by joint
     units: dict[str, str] = field(default_factory=dict)  # that the log states, by name

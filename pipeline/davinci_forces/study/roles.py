@@ -5,27 +5,36 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
+from unicodedata import normalize
 
 from davinci_forces.maths.contact.unexplained import MIN_UNEXPLAINED, Course, has_outliers, unexplained_share
 from davinci_forces.study.holding import Holding
 
-# Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.
+# Words by role, of several languages and in ASCII; `\b` stands at the edges of the words of a name, in which capitals,
+# `_` and digits separate, too.
 WORDS = {
     "empty": r"(no|without|zero) ?(weight|pay ?load|load|mass)|(weight|payload|load|mass) (none|off|zero)"
-    r"|unloaded|empty|tare|0 ?k?g",
-    "free": r"(no|without) ?(contact|touch)|free|in air|frei|ohne kontakt",
-    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g|gewicht\w*",
-    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe|silicone?|gelatine?|foam|sponge|rubber",
+    r"|unloaded|empty|tare|0 ?k?g|ohne ?(gewicht|masse|nutz ?last|last)|unbelastet|leer|a (vide|vuoto)"
+    r"|(sans|senza|sin|sem|zonder|uden) ?(masse|charge|poids|peso|carico|carga|gewicht|vaegt)",
+    "free": r"(no|without) ?(contact|touch)|free|in air|frei|kontakt ?(frei|los)|(ohne|uden) ?(kontakt|beruehrung)"
+    r"|(sans|zonder) ?contact|(sin|sem|senza) ?(contacto|contato|contatto)|libre|libero|livre|vrij",
+    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g|gewicht\w*|nutz ?last|mit ?last|belastet|poids|peso"
+    r"|carico|carga|vaegt",
+    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe|silicone?|gelatine?|foam|sponge|rubber"
+    r"|tissu|tessuto|tejido|tecido|weefsel|vaev|schwamm",
     "contact": r"contacts?|touch\w*|push\w*|pull\w*|pok\w*|press\w*|collisions?|collid\w*|hits?|with ?force|kontakt\w*"
-    r"|stoss|kollision",
-    "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",
-    "validation": r"valid\w*|val|cross ?val|hold ?out|verif\w*|(other|another|different) (path|motion|traj\w*)",
-    "identification": r"ident\w*|sys ?id|calib\w*|train\w*",
-    "excitation": r"excit\w*|exc",
-    "test": r"test|check",
+    r"|stoss\w*|stoesse|kollision\w*|beruehrung\w*|contacto|contato|contatto",
+    "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)|\w*reibung|frottement|attrito|friccion"
+    r"|rozamiento|wrijving|friktion",
+    "validation": r"(kreuz|kruis|kryds)?valid\w*|val|cross ?val|hold ?out|verif\w*"
+    r"|(other|another|different) (path|motion|traj\w*)",
+    "identification": r"ident\w*|sys ?id|[ck]alib\w*|train\w*",
+    "excitation": r"excit\w*|exc|anregung\w*|eccitazione",
+    "test": r"test|check|\w*pruefung\w*|essai|prova|prueba",
 }
+ASCII = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "Ä": "AE", "Ö": "OE", "Ü": "UE"})
 MASS = re.compile(r"(\d+(?:[.p]\d+)?) ?(k?g)\b")
-GUESSED = "CHECK: guessed from its values: "
+GUESSED = "CHECK: guessed from its values"
 WIDER = 1.2  # times the range of the logs before: a motion that reaches farther identifies, too
 
 
@@ -52,8 +61,9 @@ class Role(NamedTuple):
 def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     """Guess the role of each log: by a word of its file or folders, else by its motion and effort among others."""
     words = [_word(recording.path) for recording in recordings]
+    why = ", as no word of its name is known"
     if len(words) > 1 and all(word[0] == "test" for word in words):
-        words = [("", "")] * len(words)  # a word that all share tells none from the others
+        words, why = [("", "")] * len(words), ""  # a word that all share tells none from the others
     roles = [_by_word(recording, *word) for recording, word in zip(recordings, words, strict=True)]
     open_ones = [i for i, role in enumerate(roles) if role is None]
     touched = {i: reason for i in open_ones if (reason := _touched(recordings[i].holding))}
@@ -68,14 +78,15 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     for i in rest:  # what values say is a guess where another log of the joint may have that role
         has_others = any(moving[i] & joints for k, joints in moving.items() if k != i)
         if has_others and '"' not in chosen[i].reason:
-            chosen[i] = chosen[i]._replace(reason=f"{GUESSED}{chosen[i].reason}")
+            chosen[i] = chosen[i]._replace(reason=f"{GUESSED}{why}: {chosen[i].reason}")
     named = [role or (Role("contact", touched[i]) if i in touched else chosen[i]) for i, role in enumerate(roles)]
     return _with_tares(recordings, _with_identification(recordings, named))
 
 
 def _word(path: str) -> tuple[str, str]:
     """The kind of the first word that tells a role, and the word: of the file first, then of its folders upwards."""
-    for part in reversed(path.split("/")):
+    for name in reversed(path.split("/")):
+        part = normalize("NFKD", normalize("NFC", name).translate(ASCII)).encode("ascii", "ignore").decode()
         text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:[.p]\d+)?", part)).lower()
         kinds = [(kind, match[0]) for kind, words in WORDS.items() if (match := re.search(rf"\b({words})\b", text))]
         if kinds:
@@ -144,13 +155,21 @@ def _by_motion(
     holdings = [recording.holding for recording in recordings]
     words = {i: _word(recordings[i].path) for i in rest}
     excited = {i: kind == "excitation" for i, (kind, _) in words.items()}
-    identifying = {i: holdings[i].repeats or excited[i] for i in rest}
+    identifying = {i: bool(holdings[i].repeating) or excited[i] for i in rest}
     varied = {joint for i in [*rest, *fixed] if not holdings[i].steady for joint in holdings[i].moving}
     late: list[int] = []
-    moved = {joint for i in rest if holdings[i].repeats for joint in holdings[i].moving}
+    moved = {joint for i in rest if holdings[i].repeating for joint in holdings[i].moving}
     others = (holdings[i] for i in rest if not identifying[i])
     is_tested = any(tested) or any(moved <= set(other.moving) and not other.steady for other in others)
-    for i in sorted(rest, key=lambda i: (not holdings[i].repeats, not excited[i], *_size(holdings[i]))):
+
+    def order(i: int) -> tuple[float, ...]:
+        """Repeating motions first, then more joints; of those that reach about as far, the longest in whole periods."""
+        holding, span = holdings[i], _reach(holdings[i])
+        alike = [_reach(holdings[k]) for k in rest if holdings[k].repeating and holdings[k].moving == holding.moving]
+        time = round(holding.repeating, 1) if WIDER * span >= max(alike, default=0.0) else 0.0
+        return not holding.repeating, not excited[i], -len(holding.moving), -time, -span
+
+    for i in sorted(rest, key=order):
         holding, spans = holdings[i], _spans(holdings[i])
         within = next((reach[joint][1] for joint in spans if joint in reach), "")
         if holding.steady and not excited[i] and varied & set(holding.moving):
@@ -160,8 +179,10 @@ def _by_motion(
         elif identifying[i] and (is_tested or any(x > WIDER * reach.get(k, (0.0, ""))[0] for k, x in spans.items())):
             roles[i] = Role("identification", f'"{words[i][1]}" in its name' if excited[i] else "its motion repeats")
             _cover(reach, recordings[i])
-        elif holding.repeats:
-            roles[i] = Role("validation", f"its motion stays within that of {within}, which identifies")
+        elif holding.repeating:
+            is_within = all(x <= reach[joint][0] for joint, x in spans.items() if joint in reach)
+            how = "its motion stays within that" if is_within else "its motion reaches hardly farther than that"
+            roles[i] = Role("validation", f"{how} of {within}, which identifies")
         else:
             but = f", but that of {within} does" if within else ""
             roles[i] = Role("validation", f"its motion does not repeat{but}")
@@ -189,9 +210,9 @@ def _spans(holding: Holding) -> dict[int, float]:
     return spans or dict.fromkeys(holding.moving, 1.0)
 
 
-def _size(holding: Holding) -> tuple[float, float]:
-    """Order of logs: those that move most joints first, then those that move them farthest."""
-    return -len(holding.moving), -sum(_spans(holding).values())
+def _reach(holding: Holding) -> float:
+    """The sum of the ranges of the joints that move."""
+    return sum(_spans(holding).values())
 
 
 def _cover(reach: dict[int, tuple[float, str]], recording: Evidence) -> None:
@@ -203,7 +224,7 @@ def _with_identification(recordings: Sequence[Evidence], roles: list[Role]) -> l
     """Where no log identifies, take the free motion that reaches farthest."""
     free = [i for i, role in enumerate(roles) if role.role == "validation" and recordings[i].holding.moving]
     if free and not any(role.role == "identification" for role in roles):
-        best = min(free, key=lambda i: _size(recordings[i].holding))
+        best = max(free, key=lambda i: (len(recordings[i].holding.moving), _reach(recordings[i].holding)))
         roles[best] = Role("identification", f"{roles[best].reason}; but there is no other log to identify from")
     return roles
 
