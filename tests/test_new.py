@@ -371,6 +371,49 @@ def test_three_joints_of_which_the_third_slides_are_of_the_arm_of_the_kit(tmp_pa
     assert not (tmp_path / "robot.toml").exists()
 
 
+@pytest.mark.parametrize(
+    ("joints", "range_3", "quantity", "hint"),
+    [
+        (
+            7,
+            0.1,
+            "tau",
+            "if it is the arm of a dVRK, run `new` again with --robot dvrk_psm, which takes the first 3 joints",
+        ),
+        (6, 0.1, "i", "if it is a da Vinci arm, run `new` again with --robot davinci, which takes the first 3 joints"),
+        (
+            7,
+            0.6,
+            "tau",
+            "no shipped robot (davinci, dvrk_psm) fits; if one does, run `new` again with --robot and its name",
+        ),
+        (
+            5,
+            0.1,
+            "tau",
+            "no shipped robot (davinci, dvrk_psm) fits; if one does, run `new` again with --robot and its name",
+        ),
+    ],
+)
+def test_the_robot_that_more_joints_may_be_of_is_named_where_their_number_and_ranges_allow(
+    tmp_path, joints, range_3, quantity, hint
+):
+    t, q, dq = motion(joints)
+    scale = 1.0 / np.abs(q).max(axis=0)
+    scale[2] *= range_3
+    header = ",".join(["t", *(f"{symbol}{k}" for symbol in ("q", "dq", quantity) for k in range(joints))])
+    file = table(tmp_path / "run.csv", t, q * scale, dq * scale, effort(q, dq), header=header)
+    assert f"robot.toml: written for the {joints} joints of the logs, as " in new(file)
+    [robot] = re.findall("^robot = .*", (tmp_path / "study.toml").read_text(), re.M)
+    assert robot.startswith('robot = "robot.toml"')
+    assert robot.endswith(hint)
+    refused = call("new", file, "--robot", "dvrk_psm", code=1)
+    assert "overwrites nothing: move or delete it, then run `new` again; --print shows the new text" in refused
+    (tmp_path / "study.toml").unlink()
+    call("new", file, "--robot", "dvrk_psm")
+    assert reading.read(tmp_path).robot.name == "dvrk_psm"
+
+
 @pytest.mark.parametrize(("unit", "robot"), [("m", "davinci"), ("rad", "robot.toml")])
 def test_a_third_joint_whose_unit_is_of_an_angle_does_not_slide(tmp_path, unit, robot):
     t, q, dq = motion(3)

@@ -29,7 +29,8 @@ def run(
         return
     target = folder / "study.toml"
     if target.exists():
-        raise BadRequest(f"{target} exists already; move it away, or print the new one with --print")
+        remedy = "move or delete it, then run `new` again; --print shows the new text and writes nothing"
+        raise BadRequest(f"{target} exists already, and `new` overwrites nothing: {remedy}")
     if draft.arm.text:
         write_bytes(folder / draft.arm.name, draft.arm.text.encode())
         echo(f"{folder / draft.arm.name}: {draft.arm.reason}; check the kinds of its joints and their terms")

@@ -112,23 +112,28 @@ def arm_of(
     if beside:
         return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")
     said = next((word for word in DAVINCI_WORDS if word in words), "")
-    slides = any(2 in holding.moving for holding in counted)
-    if slides and all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
-        name = "davinci" if current else "dvrk_psm"
+    may_be = any(2 in holding.moving for holding in counted) and not words & OTHER_ARMS
+    name = "davinci" if current else "dvrk_psm"
+    if may_be and all(_is_davinci(holding, bool(said)) for holding in counted):
         robot = robots.load(name, folder)
         count = "" if n == len(robot.joints) else f"; these are the first {len(robot.joints)} of {n}"
         by_name = f'"{said}" in the names, ' if said else ""
         efforts = "currents" if current else "efforts"
         return Arm(name, robot, f"CHECK: by {by_name}a third joint that slides, and logs of {efforts}{count}")
+    if may_be and all(_is_davinci(holding, is_named=True) for holding in counted):
+        kit = "a da Vinci arm" if current else "the arm of a dVRK"
+        again = f"run `new` again with --robot {name}, which takes the first 3 joints"
+        why = ["no name says which arm it is", *why_not, f"if it is {kit}, {again}"]
+    else:
+        remedy = "if one does, run `new` again with --robot and its name"
+        why = [f"no shipped robot ({', '.join(robots.ROBOTS)}) fits", *(why_not or [remedy])]
     name = ROBOT_FILE if not (folder / ROBOT_FILE).exists() else f"robot-of-{n}.toml"
     largest = max(counted, key=lambda holding: holding.joints)
     text = robot_text(_joint_names(largest), current, _prismatic(counted), _limits(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
-    joints, shipped = "joint" if n == 1 else f"{n} joints", ", ".join(robots.ROBOTS)
-    why = "; ".join(why_not) or "--robot takes one for its first joints"
-    reason = f"written for the {joints} of the logs, as no shipped robot ({shipped}) fits; {why}"
-    return Arm(name, new_robot, reason, text)
+    joints = "joint" if n == 1 else f"{n} joints"
+    return Arm(name, new_robot, f"written for the {joints} of the logs, as {'; '.join(why)}", text)
 
 
 def _is_davinci(holding: Holding, is_named: bool) -> bool:
