@@ -315,7 +315,7 @@ def test_one_jump_of_a_position_neither_hides_nor_feigns_a_wrong_velocity():
 def test_motion_beyond_the_limits_of_a_joint_is_remarked_on_and_far_beyond_them_refused():
     assert resampled(scaled(q=1.5, dq=1.5)) == []
     beyond, text = resampled(scaled(q=4.0, dq=4.0))
-    assert "the zero of positions (`offset`)" in beyond
+    assert "correct the units, or the zero of positions (`offset`), on which" in beyond
     assert re.match(r"run/hand_roll: velocities reach .* rad/s, 2\.\d+ times the limit of 1.2 rad/s; are they", text)
     with pytest.raises(BadLog) as refused:
         resampled(scaled(q=DEG), velocity="derived")

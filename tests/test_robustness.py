@@ -606,6 +606,12 @@ def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond
         at(21.0)
 
 
+def test_no_zero_of_positions_is_offered_against_velocities_beyond_the_limits():
+    remark = remarked(lambda c: c.update(dq=2.5 * c["dq"]))
+    assert "velocities from" in remark
+    assert "to 1.2; correct the units, or the `rate`, or `limits` in [robot_overrides], by which" in remark
+
+
 @pytest.mark.slow
 def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
     """A log whose position is in other units than it says is refused, and the rest comes out as without it."""
