@@ -79,7 +79,7 @@ from davinci_forces.report.sections import (
     weight as weight_section,
 )
 from davinci_forces.report.sections.joints.details import correlations
-from davinci_forces.report.sections.parts import trust
+from davinci_forces.report.sections.parts import scored_predictions, trust
 from davinci_forces.report.sections.summary import caveats, opening
 from davinci_forces.report.verdicts import Trust
 from davinci_forces.study import Source
@@ -384,6 +384,20 @@ def test_an_error_that_is_mostly_constant_is_named_with_what_is_left_without_it(
     p = replace(p, model_error=0.5, mean_error=0.4, mean_error_std=0.01, effort_rms=1.0)
     [(_, text)] = caveats.looks_at_model(full, Trust("hand_roll", p, None, None))
     assert f"; {full.size(p, 'model_error', 0.3, 2)} without its constant part, " in text
+    assert "an offset of the day, and of no interest, state `free` in that log: levels and band" in text
+    logs = [replace(log, free=((0.0, 5.0),)) if log.name == p.log else log for log in full.study.logs]
+    stated = replace(full, study=replace(full.study, logs=tuple(logs)))
+    assert "state `free`" not in next(caveats.looks_at_model(stated, Trust("hand_roll", p, None, None)))[1]
+
+
+@pytest.mark.parametrize(("mean_error", "offered"), [(0.04, True), (0.0, False)])
+def test_a_narrow_band_of_a_log_whose_error_is_mostly_constant_offers_free_windows(full: Context, mean_error, offered):
+    used = scored_predictions(full, "hand_roll")[0]
+    p = replace(used, model_error=0.05, mean_error=mean_error, mean_error_std=0.001, effort_rms=1.0)
+    logs = Catalogue(lambda kind: [p if record is used else record for record in full.catalogue.records(kind)])
+    space = replace(full.catalogue.records(FreeSpace)[0], log=p.log, detection_level=0.2, coverage=0.73)
+    [(_, text)] = caveats.looks_at_band(replace(full, catalogue=logs), Trust("hand_roll", p, space, None))
+    assert ("an offset of the day, and of no interest, state `free` in that log" in text) == offered
 
 
 def test_an_error_of_twice_the_effort_suggests_a_wrong_sign(full: Context):

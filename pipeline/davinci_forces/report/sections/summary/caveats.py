@@ -10,7 +10,7 @@ from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import literal, message
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import grade_of_mass, of_joint
+from davinci_forces.report.sections.parts import grade_of_mass, of_joint, scored_predictions
 from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 
 SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
@@ -117,9 +117,17 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         share = percent(trusted.share)
         share = f"{100 * trusted.share:.1f} %" if share == percent(verdicts.GOOD) else share
         text = f"the model error is {error}, {share} of the effort{constant or opposed}; "
-        text += f"that of a good model is at most {percent(verdicts.GOOD)}."
+        text += f"that of a good model is at most {percent(verdicts.GOOD)}.{offset_remedy(context, p)}"
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
+
+
+def offset_remedy(context: Context, p: Prediction) -> str:
+    """What to state where the error in a log is mostly constant and may be the offset of the day; else ""."""
+    if context.study.log(p.log).free or not is_mostly_constant(p):
+        return ""
+    without = "levels and band are then without it, the model error is not"
+    return f" If its constant part is an offset of the day, and of no interest, state `free` in that log: {without}."
 
 
 def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, str]]:
@@ -154,6 +162,9 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
             covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
             covers += "until then, judge an effort by the alarm level."
+        named = trusted.prediction.log if trusted.prediction is not None and trusted.share > verdicts.GOOD else ""
+        others = (p for p in scored_predictions(context, trusted.joint) if p.log == space.log != named)
+        covers += next((offset_remedy(context, p) for p in others), "")
         weight = min(1.0 + 10 * (verdicts.COVERED[0] - space.coverage), MAX_NARROW)
         yield weight, f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
 
