@@ -77,6 +77,10 @@ def test_what_cannot_be_exported_is_refused_in_one_message(finished, tmp_path):
     out = ("--out", tmp_path / "out")
     message = one_message(call("export", finished, "--to", "fmu", *out, code=1))
     assert message == f"error: there is no format 'fmu'; there are {', '.join(FORMATS)}"
+    assert (
+        one_message(call("export", finished, code=1))
+        == f"error: write --to and a format; there are {', '.join(FORMATS)}"
+    )
     message = one_message(call("export", finished, "--to", "json", "--joint", "elbow", *out, code=1))
     assert "has no joint 'elbow'; it has hand_roll" in message
     assert not (tmp_path / "out").exists()

@@ -400,6 +400,18 @@ def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_sp
         guide.page(topic)
 
 
+@pytest.mark.parametrize(
+    ("topic", "words"),
+    [
+        ("skip", "topic `study`"),
+        ("trust", "topic `how-far-to-trust-it`"),
+        ("smallest contact", "for a contact in a stated window, the detection level"),
+    ],
+)
+def test_words_that_users_look_up_lead_to_a_page_or_say_which_number_answers(topic, words):
+    assert words in guide.page(topic).as_text
+
+
 def test_a_topic_that_is_a_notebook_names_its_file():
     with pytest.raises(BadRequest, match=r"from-arrays is a notebook; open .*from-arrays\.ipynb in Jupyter"):
         guide.page("from-arrays")

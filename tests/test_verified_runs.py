@@ -57,6 +57,9 @@ def test_a_number_is_traced_to_the_raw_files_on_which_it_rests(finished):  # noq
     assert all(sha256(Path(name).read_bytes()).hexdigest().startswith(sha) for name, sha in raw.items())
     said = call("verify", finished, "--number", "contact.push.hand_rol.1.peak", code=1)
     assert f"did you mean {key}" in " ".join(said.split())
+    said = call("verify", finished, "--number", "foo", code=1)
+    listed = f"has no number foo; {reports(finished) / 'results.json'} lists the key of every number"
+    assert listed in " ".join(said.split())
 
 
 def test_verify_names_a_number_that_was_altered(finished):  # noqa: F811

@@ -18,7 +18,9 @@ from davinci_forces.runner.console import echo
 
 def run(
     study: StudyFolder,
-    to: Annotated[str, Option("--to", metavar="|".join(FORMATS), help=f"Format: {', '.join(FORMATS)}.")],
+    to: Annotated[
+        str, Option("--to", metavar="|".join(FORMATS), help=f"Format, always needed: {', '.join(FORMATS)}.")
+    ] = "",
     out: Annotated[Path | None, Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
     joint: Annotated[
         list[str] | None, Option(help="Export this joint only; may be repeated. Default: all with a model.")
@@ -38,7 +40,8 @@ def run(
     folders = runs.folders(runs.single_study(study), processed, reports)
     place = out or Path(f"{folders.processed.name}-{to}")
     if to not in FORMATS:
-        raise BadRequest(f"there is no format {to!r}; there are {', '.join(FORMATS)}")
+        why = f"there is no format {to!r}" if to else "write --to and a format"
+        raise BadRequest(f"{why}; there are {', '.join(FORMATS)}")
     for results in (folders.processed.parent, folders.reports.parent):
         if place.resolve().is_relative_to(results.resolve()):
             raise BadRequest(f"{place} is below {results}, which holds results only; choose another folder")

@@ -35,10 +35,11 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
         "External efforts are those of its smoother, which uses the whole recording and has no delay."
         + (tested if context.catalogue.records(Explanation) else "")
     )
-    if at_rest := [parts.run_name(t) for t in tracks if t.at_rest]:
+    if at_rest := [t for t in tracks if t.at_rest]:
+        levels = [f"{parts.run_name(t)}: {context.size(t, 'static_friction', t.static_friction)}" for t in at_rest]
         yield Prose(
-            f"Joints at rest have no figures ({', '.join(at_rest)}). At standstill friction takes any value up "
-            "to its static level, and hides external efforts up to that level."
+            f"Joints at rest have no figures. At standstill friction takes any value up to its static level, and hides "
+            f"external efforts up to that level ({'; '.join(levels)})."
         )
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]

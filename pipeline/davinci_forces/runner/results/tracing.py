@@ -19,8 +19,9 @@ def trace(folders: Folders, key: str) -> Iterator[str]:
     numbers = numbers_of(folders)
     if key not in numbers:
         alike = [name for name in numbers if name.split(".")[:2] == key.split(".")[:2]] or numbers
-        near = " or ".join(get_close_matches(key, alike, 3)) or "see results.json"
-        raise BadRequest(f"the report of {folders.raw} has no number {key}; did you mean {near}?")
+        near = " or ".join(get_close_matches(key, alike, 3))
+        hint = f"did you mean {near}?" if near else f"{folders.reports / 'results.json'} lists the key of every number"
+        raise BadRequest(f"the report of {folders.raw} has no number {key}; {hint}")
     number = numbers[key]
     file, _, place = number["source"].partition("#")
     error = "" if number["std"] is None else f" ± {number['std']:.2g}"
