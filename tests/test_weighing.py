@@ -26,8 +26,26 @@ from davinci_forces.maths.contact.weighing import (
     widening_factor,
 )
 from davinci_forces.maths.periods.shift import circular, roll, straight
-from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, TorqueConstant, Weight
+from davinci_forces.records import (
+    Diagnostic,
+    FreeWeight,
+    JointModel,
+    Load,
+    Motion,
+    Signal,
+    TorqueConstant,
+    Weight,
+    store,
+)
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.report.context import Context
+from davinci_forces.report.results import collect
+from davinci_forces.report.sections import weight as weight_section
 from davinci_forces.robots import dvrk_psm
+from davinci_forces.runner import execution
+from davinci_forces.runner.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.plan import Task
 from davinci_forces.stages import weigh
 from davinci_forces.study import AttachedMass, Source, Weighing, Weighings
 from tests import arm
@@ -549,6 +567,27 @@ def test_the_diagnostic_says_the_constant_its_error_and_that_it_is_not_applied()
         [text] = [text for text in said if "heavy/hand_roll: the known mass" in text]
         value = f"torque_constant = {of.torque_constant:.3g} ± {of.torque_constant_std:.2g} N m/A with gear_ratio = 200"
         assert [part for part in (value, words, "not applied") if part not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "gear_ratio", "unit"),
+    [("instrument_slide", 1.0, "N/A"), ("instrument_slide", GEAR, "N m/A"), ("hand_roll", 1.0, "N m/A")],
+)
+def test_a_torque_constant_at_a_joint_that_slides_is_a_force_per_ampere_wherever_it_is_stated(
+    tmp_path, name, gear_ratio, unit
+):
+    joints = tuple(replace(joint, gear_ratio=gear_ratio) for joint in ROBOT.joints)
+    joint = next(joint for joint in joints if joint.name == name)
+    proposed = TorqueConstant("heavy", name, 0.4, 40.0, 48.0, 0.5)
+    assert f"48 ± 0.5 {unit} with gear_ratio = {gear_ratio:g}; 40 is used" in weigh.proposal(proposed, joint)
+    task = Task("weigh", "heavy", Fingerprint({}, {}, {}, {}, {}, ""), joints={j.name: j.for_units for j in joints})
+    with execution.record_writer(Folders(tmp_path, tmp_path, tmp_path), task) as writer:
+        place = writer.write(proposed)
+    catalogue = Catalogue(lambda kind: [store.read(kind, tmp_path, place)] if kind is TorqueConstant else [])
+    context = Context(catalogue, None, collect(catalogue), None)
+    assert context.results[f"weight.heavy.{name}.torque_constant"].unit == unit
+    [row] = weight_section.torque_constants(context, catalogue.records(TorqueConstant)).rows
+    assert [str(cell) for cell in row[3:5]] == [f"40.00 {unit}", f"48.00 ± 0.50 {unit}"]
 
 
 def test_a_tare_leaves_the_noise_as_the_error_of_a_constant():

@@ -209,7 +209,8 @@ def _moves(joint: "Joint") -> str:
     words = [joint.kind.value, f"{low:g} to {high:g} {position}" if math.isfinite(high - low) else "unlimited"]
     words += [f"at most {max_speed:g} {position}/s"] if math.isfinite(max_speed) else []
     words += [f"at most {max_effort:g} {joint.unit('{effort}')}"] if math.isfinite(max_effort) else []
-    motor = f"gear ratio {joint.gear_ratio:g}, torque constant {joint.torque_constant:g} N m/A"
+    constant = joint.unit(f"{joint.torque_constant:g} {{torque_constant}}")
+    motor = f"gear ratio {joint.gear_ratio:g}, torque constant {constant}"
     words += [motor] if (joint.gear_ratio, joint.torque_constant) != (1.0, 1.0) else []
     return ", ".join(words)
 

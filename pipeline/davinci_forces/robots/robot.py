@@ -28,14 +28,16 @@ class Kind(Enum):
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
 
-    def unit(self, template: str, measured: str = "") -> str:
+    def unit(self, template: str, measured: str = "", is_geared: bool = True) -> str:
         """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint.
 
         If effort is `measured` in A, a parameter that multiplies a motion is in A over the unit of that motion.  Link
-        parameters then contain the unknown factor between A and the effort's unit.
+        parameters then contain the unknown factor between A and the effort's unit.  Unless the joint `is_geared`, its
+        torque constant is the effort of the joint per A.
         """
         position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
         units = {"position": position, "effort": effort, "inertia": inertia, "mass_moment": "kg m", "gain": ""}
+        units["torque_constant"] = "N m/A" if is_geared else f"{effort}/A"
         if measured:
             units |= {"effort": measured, "inertia": f"{measured} s^2/{position}", "mass_moment": f"{measured} s^2/m"}
             units["gain"] = f" {measured}/({effort})"
@@ -79,7 +81,7 @@ class Joint:
     terms: tuple[Term, ...]
     limits: Limits
     gear_ratio: float = 1.0  # eta [-], or [rad/m] for a prismatic joint
-    torque_constant: float = 1.0  # K_m [N m/A]
+    torque_constant: float = 1.0  # K_m [N m/A], or [N/A] of a prismatic joint without a gear
     effort: str = ""  # "A" if the torque constant is unknown, so that effort is the motor current; else ""
     harmonics: int = 2  # N_f of the excitation
     # Published excitation trajectories by name: period, a0, a1, b1, a2, b2, ...
@@ -90,9 +92,15 @@ class Joint:
     physical: PhysicalTable | None = None  # physical parameters behind its terms, if known
     printed: tuple[PrintedColumn, ...] = ()  # published parameters of its terms
 
+    @property
+    def for_units(self) -> tuple[Kind, str, bool]:
+        """What its units depend on: its kind, the unit of a measured effort, and whether it is geared."""
+        return self.kind, self.effort, self.gear_ratio != 1.0
+
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
-        return self.kind.unit(template, self.effort)
+        kind, measured, is_geared = self.for_units
+        return kind.unit(template, measured, is_geared)
 
     @property
     def effort_per_ampere(self) -> float:

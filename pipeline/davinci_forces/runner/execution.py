@@ -49,7 +49,7 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
     messages: list[str] = []
     start = perf_counter()
     try:
-        with _writer(folders, task) as writer:
+        with record_writer(folders, task) as writer:
             for record in function_of(task.step)(**arguments(folders, task)):
                 writer.write(record)
                 if isinstance(record, Diagnostic):
@@ -61,7 +61,7 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
             raise
         message = error_message(error)
         failed = without_folders(message, folders)
-        with _writer(folders, task) as writer:
+        with record_writer(folders, task) as writer:
             writer.write(diagnostic(stage_of(task.step), file_name(task.subject), "error", failed))
         return Outcome(task, _made(writer), failed, (f"error: {message}",), perf_counter() - start)
     finally:
@@ -137,13 +137,14 @@ def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
 _read_cached = lru_cache(maxsize=256)(_read)
 
 
-def _writer(folders: Folders, task: Task) -> "store.Writer":
+def record_writer(folders: Folders, task: Task) -> "store.Writer":
+    """The writer of a task's records, with the units of their joints."""
     from davinci_forces.records import store
 
     def unit(record: Record) -> "store.Unit":
         name = getattr(record, "joint", getattr(record, "group", ""))
-        kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
-        return lambda template: kind.unit(template, measured)
+        kind, measured, is_geared = task.joints.get(name, (Kind.REVOLUTE, "", True))
+        return lambda template: kind.unit(template, measured, is_geared)
 
     return store.Writer(folders.processed, unit, vars(task.fingerprint))
 

@@ -108,7 +108,7 @@ class Task:
     fingerprint: Fingerprint
     records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
     given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
-    joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # by joint, for the units of its records
+    joints: dict[str, tuple[Kind, str, bool]] = field(default_factory=dict)  # by joint, for the units of its records
 
     @property
     def subject(self) -> str:
@@ -123,7 +123,7 @@ class Plan:
     def __init__(self, study: Study, ledger: Ledger) -> None:
         self.study, self.ledger = study, ledger
         self._entries = {entry.name: entry for entry in study.logs}
-        self._joints = {joint.name: (joint.kind, joint.effort) for joint in study.robot.joints}
+        self._joints = {joint.name: joint.for_units for joint in study.robot.joints}
         self._hashes: dict[tuple[str, str], str] = {}
         self._places = Places(study, ledger.entries())
         self._seen = len(ledger.changes)

@@ -15,7 +15,7 @@ from davinci_forces.records.prediction import JointModel
 from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_names
 from davinci_forces.records.recordings import Motion
 from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
-from davinci_forces.robots.robot import Robot
+from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry, Weighing, Weighings
 
 FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing touches the arm
@@ -168,15 +168,15 @@ def torque_constants(
         record = TorqueConstant(weight_log.log, load.joint, weight_log.weight.mass, stated, *scaled)
         yield record
         subject = f"{weight_log.log}.{load.joint}.torque-constant"
-        yield diagnostic("weigh", subject, "note", proposal(record, joint.gear_ratio))
+        yield diagnostic("weigh", subject, "note", proposal(record, joint))
 
 
-def proposal(record: TorqueConstant, gear_ratio: float) -> str:
+def proposal(record: TorqueConstant, joint: Joint) -> str:
     """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
     value, std, used = record.torque_constant, record.torque_constant_std, record.torque_constant_used
     text = (
         f"{record.log}/{record.joint}: the known mass of {record.stated_mass:g} kg gives torque_constant = "
-        f"{value:.3g} ± {std:.2g} N m/A with gear_ratio = {gear_ratio:g}"
+        f"{value:.3g} ± {std:.2g} {joint.unit('{torque_constant}')} with gear_ratio = {joint.gear_ratio:g}"
     )
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'

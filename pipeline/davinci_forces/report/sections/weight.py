@@ -47,11 +47,11 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
     """The torque constants that known masses give, beside those that are used."""
     rows = []
     for constant in constants:
-        stated, used = Number(constant.stated_mass, "kg"), Number(constant.torque_constant_used, "N m/A")
+        used = context.size(constant, "torque_constant_used", constant.torque_constant_used, 4)
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
         away = abs(constant.torque_constant - constant.torque_constant_used) / constant.torque_constant_std
         follows = "–" if math.isnan(away) else "keep" if away <= NORMAL_95 else "check"
-        rows.append((*run_cells(constant), str(stated), str(used), proposed, follows))
+        rows.append((*run_cells(constant), str(Number(constant.stated_mass, "kg")), used, proposed, follows))
     caption = (
         "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
         'apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml; a line `effort = "A"` '
