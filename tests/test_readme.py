@@ -54,7 +54,7 @@ from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import AttachedMass, LogEntry, Options, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
-from davinci_forces.study.entries import ROLES
+from davinci_forces.study.entries import ROLES, TARE_ROLES
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "pipeline" / "davinci_forces"
@@ -124,6 +124,11 @@ def test_roles_are_those_that_there_are():
     assert sorted(listed) == sorted(ROLES)
     comment = re.search(r"^role = .*# (.*)$", PAGES["own-arm"], re.M)[1]
     assert re.split(r", | or ", comment) == list(ROLES)
+
+
+@pytest.mark.parametrize("page", ["weight", "study"])
+def test_the_roles_that_a_tare_may_have_are_said_where_a_tare_is_stated(page):
+    assert f"role {' or '.join(TARE_ROLES)}" in PAGES[page]
 
 
 def test_channels_are_those_that_there_are_with_the_units_taken():
