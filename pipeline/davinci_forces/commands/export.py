@@ -18,9 +18,7 @@ from davinci_forces.runner.console import echo
 
 def run(
     study: StudyFolder,
-    to: Annotated[
-        str, Option("--to", metavar="|".join(FORMATS), help=f"Format, always needed: {', '.join(FORMATS)}.")
-    ] = "",
+    to: Annotated[str, Option("--to", metavar="|".join(FORMATS), help=f"Needed: one of {', '.join(FORMATS)}.")] = "",
     out: Annotated[Path | None, Option(help="Folder to write, instead of ./<study>-<format>.")] = None,
     joint: Annotated[
         list[str] | None, Option(help="Export this joint only; may be repeated. Default: all with a model.")

@@ -1,9 +1,8 @@
 """All symbols that the pipeline stores or plots: the meaning and the unit of each, from `quantities.csv`.
 
 A revolute joint has positions in rad and efforts in N m; a prismatic joint has positions in m and efforts in N.
-Units are therefore written with {position} and {effort}, which each joint replaces by its own, and {torque_constant},
-which is N m/A, but N/A of a prismatic joint without a gear.  The unit of a pure number is 1, and that of a text is
-empty.
+Units are therefore written with {position} and {effort}, which each joint replaces by its own; {torque_constant} is in
+N/A of a prismatic joint without a gear.  The unit of a pure number is 1, and that of a text is empty.
 """
 
 import csv

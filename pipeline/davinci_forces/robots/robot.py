@@ -99,8 +99,7 @@ class Joint:
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
-        kind, measured, is_geared = self.for_units
-        return kind.unit(template, measured, is_geared)
+        return self.kind.unit(template, *self.for_units[1:])
 
     @property
     def effort_per_ampere(self) -> float:

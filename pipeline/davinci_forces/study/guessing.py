@@ -134,5 +134,4 @@ def with_motion(log: Log, holding: Holding, samples: dict[str, Array], unnamed: 
 def _whole_periods(repeat: Repetition, N: int) -> float:
     """The samples in whole periods, 0 if the section that repeats is less than half of the N samples of a log."""
     size = repeat.stop - repeat.start
-    periods = int(size / repeat.lag + PERIOD_TOLERANCE)
-    return periods * repeat.lag if size >= MIN_REPEATING_SHARE * N else 0.0
+    return int(size / repeat.lag + PERIOD_TOLERANCE) * repeat.lag if size >= MIN_REPEATING_SHARE * N else 0.0
