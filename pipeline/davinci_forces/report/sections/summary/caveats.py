@@ -126,8 +126,8 @@ def offset_remedy(context: Context, p: Prediction) -> str:
     """What to state where the error in a log is mostly constant and may be the offset of the day; else ""."""
     if context.study.log(p.log).free or not is_mostly_constant(p):
         return ""
-    without = "levels and band are then without it, the model error is not"
-    return f" If its constant part is an offset of the day, and of no interest, state `free` in that log: {without}."
+    remedy = "state `free` in that log: levels and band are then without it, the model error is not"
+    return f" If the constant part of the model error is an offset of the day, and of no interest, {remedy}."
 
 
 def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, str]]:
