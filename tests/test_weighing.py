@@ -565,7 +565,8 @@ def test_the_diagnostic_says_the_constant_its_error_and_that_it_is_not_applied()
         constants, said = by_current(2, stated)
         of = constants["hand_roll"]
         [text] = [text for text in said if "heavy/hand_roll: the known mass" in text]
-        value = f"torque_constant = {of.torque_constant:.3g} ± {of.torque_constant_std:.2g} N m/A with gear_ratio = 200"
+        assert 0.001 < of.torque_constant_std < 0.0099  # so the last printed digit is the fourth decimal
+        value = f"torque_constant = {of.torque_constant:.4f} ± {of.torque_constant_std:.4f} N m/A with gear_ratio = 200"
         assert [part for part in (value, words, "not applied") if part not in text] == []
 
 

@@ -337,7 +337,7 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
     level = full.number("threshold.hand_roll.alarm_level", 2, std=None)
     assert said == (
-        f"Efforts stand out from free motion above the alarm level of {level} on the hand roll; on an unseen path the "
+        f"An effort stands out from free motion above its alarm level: {level} on the hand roll; on an unseen path the "
         "model errs by 16 % on the hand pitch, so judge its efforts with caution; on an unseen path the model errs by "
         "30 % on the instrument slide, too much to be believed; in free motion the 95 % band of each joint is wide "
         "enough."
@@ -345,8 +345,37 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
     said = opening.verdict_sentence(full, [narrow])
-    where = f"above the alarm level of {level} on the hand roll (whose 95 % band is too narrow)"
-    assert said == f"Efforts stand out from free motion {where}."
+    where = f"above its alarm level: {level} on the hand roll (whose 95 % band is too narrow)"
+    assert said == f"An effort stands out from free motion {where}."
+    [same] = trusts(full, hand_roll=0.16)
+    same = replace(same, prediction=replace(same.prediction, path="same path"))
+    assert "On the fitted path the model errs by 16 % on the hand roll, and another path was not tested" in (
+        opening.verdict_sentence(full, [same])
+    )
+
+
+def test_page_one_says_why_there_is_no_force_at_the_tip(full: Context):
+    """Of the small arm in amperes, and of one with more joints than carry a tip."""
+    assert any("force at the tip up to" in line for line in opening.forces_at_tip(full))
+    robot = full.study.robot
+    in_amperes = replace(robot, joints=tuple(replace(joint, effort="A") for joint in robot.joints))
+    four = replace(robot, joints=(*robot.joints, robot.joints[0]))
+    for arm, why in ((robot, None), (in_amperes, "the torque constants of all joints"), (four, "and this one has 4")):
+        without = replace(full, study=replace(full.study, robot=arm), catalogue=Catalogue(lambda kind: []))
+        said = [*opening.forces_at_tip(without)]
+        assert len(said) == (why is not None)
+        assert why is None or why in said[0]
+
+
+def test_what_study_toml_is_warned_of_is_looked_at_first_where_it_spoils_all_efforts(full: Context):
+    geared = "study.toml:7: 1 A of hand_roll counts as 426 N m: its torque_constant is 9.7 times the robot's"
+    old = "study.toml:9: the setting 'derivative' no longer has an effect; remove it"
+    context = replace(full, study=replace(full.study, remarks=(old, geared)))
+    weights = {text: weight for weight, text in caveats.looks_at(context, []) if "study.toml" in text}
+    assert sorted(weights.values()) == [caveats.WARNING, caveats.FIRST]
+    assert weights[next(text for text in weights if "counts as" in text)] == caveats.FIRST
+    listed = [block.items for block in walk(written("runs", context)) if isinstance(block, Bullets)]
+    assert any("1 A of hand_roll counts as 426 N m" in text for items in listed for text in items)
 
 
 def test_the_scale_of_each_friction_is_stated_with_its_unit(full: Context):

@@ -178,20 +178,20 @@ def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse
     results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     assert standard_error(results[1], results[0]) > 0.001
     named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
-    assert ("overfits" in reason(named, results, 0, 0)) == overfits
+    assert ("overfits" in reason(named, results, 0, 0, [True, True])) == overfits
 
 
 @pytest.mark.parametrize(("difference", "overfits"), [(0.9e-4, False), (1.1e-4, True)])
 def test_errors_that_differ_by_less_than_the_last_printed_digit_are_equal(difference, overfits):
     results = [worth(0.1), worth(0.1 + difference)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
-    assert ("overfits" in reason(named, results, 0, 0)) == overfits
+    assert ("overfits" in reason(named, results, 0, 0, [True, True])) == overfits
 
 
 def test_a_candidate_that_fits_as_well_to_the_last_printed_digit_does_not_overfit():
     results = [worth(0.1), worth(0.2)._replace(fitted=worth(0.1 - 0.9 * LAST_DIGIT).unseen)]
     named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
-    assert "overfits" not in reason(named, results, 0, 0)
+    assert "overfits" not in reason(named, results, 0, 0, [True, True])
 
 
 def test_an_inertia_has_to_be_positive_at_fifty_poses_of_each_log_or_at_all_of_a_shorter_one():
@@ -267,12 +267,24 @@ def test_no_model_that_physics_forbids_is_better_than_the_chosen_one_that_it_all
     assert both.chosen.name == "alone"
 
 
+@pytest.mark.parametrize(("variant", "kind"), [(CHOSEN, "share links"), ("coupled", "have 10 parameters")])
+def test_a_preferred_model_that_errs_surely_more_than_the_best_is_explained_by_the_one_that_does_not(variant, kind):
+    """The third of these models is chosen, as the second, of the same rank, is not clearly worse than the first."""
+    results = [worth(0.100, 0.9, 1), worth(0.101, 0.9, 2), worth(0.1005, 0.9, 1), worth(0.1001, 0.9, 2)]
+    rank = 0 if variant == CHOSEN else 10
+    made = [Named("best", 20, variant), *(Named(name, rank, variant) for name in ("doubtful", "taken", "forbidden"))]
+    why = reason(made, results, 2, 0, [True, True, True, False])
+    assert f"models that {kind} are preferred unless all are clearly worse, and doubtful is not (0.0010" in why
+    assert "it is not clearly better" in reason(made, results, 1, 0, [True] * 4)
+
+
 def test_the_reason_names_a_better_model_of_the_other_selection():
     doubtful = selection_of(small=(3, 0.11, True), large=(30, 0.10, True))
     fixed = replace(doubtful, chosen=doubtful.candidates[0])  # as if it were not clearly worse than the large one
     both = better(fixed, selection_of(searched=(9, 0.105, True)))
     assert (both.chosen.name, both.best.name) == ("searched", "large")
     assert "the best, large, errs by 0.0050 less" in both.why
+    assert "it gave way to a smaller model, which errs more than the chosen one" in both.why
     assert both.why.endswith("The best has 30 parameters, the chosen one 9")
 
 

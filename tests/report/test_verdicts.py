@@ -195,7 +195,14 @@ def test_joints_that_agree_poorly_on_a_mass_are_told_of(agreement, side, told):
 
 
 @pytest.mark.parametrize(
-    ("used", "log", "why"), [(12.6, "run", "taken"), (12.63, "run", "right"), (12.6, "b", "right")]
+    ("used", "log", "why"),
+    [
+        (12.64, "run", "taken"),
+        (12.643, "run", "taken"),
+        (12.63, "run", "right"),
+        (12.6, "run", "right"),
+        (12.64, "b", "right"),
+    ],
 )
 def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, log, why):
     constant = TorqueConstant(log, "lift", 0.5, used, 12.643, 0.17)
@@ -203,9 +210,9 @@ def test_a_mass_does_not_test_the_torque_constant_that_its_own_log_gave(used, lo
 
 
 @pytest.mark.parametrize(("changed", "why"), [({}, "right"), ({"lift": {"gear_ratio": 3.0}}, "right"),
-                                             ({"lift": {"torque_constant": 12.6}}, "taken")])  # fmt: skip
+                                             ({"lift": {"torque_constant": 12.64}}, "taken")])  # fmt: skip
 def test_only_a_torque_constant_that_the_study_states_can_be_of_the_mass_s_own_log(changed, why):
-    constant = TorqueConstant("run", "lift", 0.5, 12.6, 12.643, 0.17)
+    constant = TorqueConstant("run", "lift", 0.5, 12.64, 12.643, 0.17)
     catalogue = Catalogue(lambda kind: [constant] if kind is TorqueConstant else [])
     context = SimpleNamespace(catalogue=catalogue, study=SimpleNamespace(changed=changed))
     assert grade_of_mass(context, weight(mass=0.5, mass_std=0.004, stated_mass=0.5))[1] == why

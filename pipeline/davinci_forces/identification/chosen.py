@@ -77,9 +77,11 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
         return None
     models, results = zip(*pairs, strict=True)
     physical = tuple(c.is_physical for c in models)
-    i, best = choose(models, results, physical if any(physical) else [True] * len(models))
+    eligible = physical if any(physical) else [True] * len(models)
+    i, best = choose(models, results, eligible)
     repeated = tuple(over_periods(c, count) for c in models)
-    return Selection(models, results, physical, repeated, models[i], models[best], reason(models, results, i, best))
+    why = reason(models, results, i, best, eligible)
+    return Selection(models, results, physical, repeated, models[i], models[best], why)
 
 
 def better(fixed: Selection, searched: Selection | None) -> Selection:
@@ -98,7 +100,7 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
         free = [of.candidates[choose(of.candidates, of.results, [True] * len(of.results))[0]] for of in both]
         i = min((place[c.name] for c in free), key=lambda k: results[k].score)
     best = min(np.flatnonzero(eligible).tolist(), key=lambda k: results[k].score)
-    chosen, why = candidates[i]._replace(variant=CHOSEN), reason(candidates, results, i, best)
+    chosen, why = candidates[i]._replace(variant=CHOSEN), reason(candidates, results, i, best, eligible)
     return Selection(candidates, results, physical, repeated, chosen, candidates[best], why)
 
 
@@ -120,18 +122,34 @@ def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:
     return (errors.score, standard_error(errors)) if errors else (float("nan"), float("nan"))
 
 
-def reason(candidates: Sequence[Candidate], results: Sequence[CrossValidation], i: int, best: int) -> str:
+def reason(
+    candidates: Sequence[Candidate], results: Sequence[CrossValidation], i: int, best: int, eligible: Sequence[bool]
+) -> str:  # fmt: skip
     """State why a candidate was chosen, and whether one that fits better overfits."""
     text = f"{candidates[i].name} has an out-of-sample error of {results[i].score:.4f} of the effort"
     if i == best:
         text += ", less than any other"
     else:
-        difference, std = results[i].score - results[best].score, standard_error(results[i], results[best])
-        preferred = "a model that is preferred, as it is smaller or shares links, is not clearly worse"
-        clearly = "it is not clearly better" if difference <= std else preferred
+        difference, std = by_more(results[i], results[best])
+        peers = {
+            c.name: by_more(result, results[best])
+            for c, result, is_eligible in zip(candidates, results, eligible, strict=True)
+            if is_eligible and (c.rank, c.variant == CHOSEN) == (candidates[i].rank, candidates[i].variant == CHOSEN)
+        }
+        close, (more, error) = min(peers.items(), key=lambda peer: peer[1][0] - peer[1][1])
+        kind = "share links" if candidates[i].variant == CHOSEN else f"have {candidates[i].size} parameters"
+        if difference <= std:
+            why = "it is not clearly better"
+        elif more <= error:
+            why = (
+                f"models that {kind} are preferred unless all are clearly worse, and {close} is not ({more:.4f}, with "
+            )
+            why += f"{error:.4f}); of them, the one with the least error is chosen"
+        else:
+            why = "it gave way to a smaller model, which errs more than the chosen one"
         text += (
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
-            f"{clearly}. The best has {candidates[best].size} parameters, the chosen one {candidates[i].size}"
+            f"{why}. The best has {candidates[best].size} parameters, the chosen one {candidates[i].size}"
         )
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))
@@ -142,6 +160,11 @@ def reason(candidates: Sequence[Candidate], results: Sequence[CrossValidation], 
             f"predicts worse ({results[closest].score:.4f}): it overfits"
         )
     return text
+
+
+def by_more(result: CrossValidation, best: CrossValidation) -> tuple[float, float]:
+    """By how much a candidate errs more than the best one, with its standard error."""
+    return result.score - best.score, standard_error(result, best)
 
 
 def parameters(

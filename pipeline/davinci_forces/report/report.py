@@ -31,7 +31,8 @@ LEGEND = (
     "coverage: of the 95 % band"
 )
 HEADER = (
-    "joint", "verdict", "new path", "model error", "relative error", "R2", "ceiling", "detection level", "coverage",
+    "joint", "verdict", "new path", "model error", "relative error", "R2", "ceiling", "detection level",
+    "alarm level", "coverage",
 )  # fmt: skip
 
 

@@ -187,9 +187,12 @@ def doubt_of_mass(weight: Weight) -> str:
 
 
 def is_taken(constant: TorqueConstant) -> bool:
-    """Whether the torque constant in use is the one that the log gives, to three or more digits."""
+    """Whether the torque constant in use is the one that the log gives, to four digits or as many as are printed."""
     given, used = constant.torque_constant, constant.torque_constant_used
-    return any(math.isclose(used, float(f"{given:.{digits}g}"), rel_tol=1e-9) for digits in (3, 4, 5, 6))
+    printed = math.floor(math.log10(abs(given))) - math.floor(math.log10(constant.torque_constant_std)) + 2
+    least = min(max(printed, 2), 4)
+    has_fewer = used == float(f"{used:.{least - 1}g}")  # a round number, as of a data sheet
+    return not has_fewer and any(math.isclose(used, float(f"{given:.{n}g}"), rel_tol=1e-9) for n in range(least, 9))
 
 
 def truth_level(errors: Sequence[float]) -> tuple[Level, str]:

@@ -174,9 +174,11 @@ def torque_constants(
 def proposal(record: TorqueConstant, joint: Joint) -> str:
     """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
     value, std, used = record.torque_constant, record.torque_constant_std, record.torque_constant_used
+    decimals = max(1 - int(np.floor(np.log10(std))), 0)
     text = (
         f"{record.log}/{record.joint}: the known mass of {record.stated_mass:g} kg gives torque_constant = "
-        f"{value:.3g} ± {std:.2g} {joint.unit('{torque_constant}')} with gear_ratio = {joint.gear_ratio:g}"
+        f"{value:.{decimals}f} ± {std:.{decimals}f} {joint.unit('{torque_constant}')} with "
+        f"gear_ratio = {joint.gear_ratio:g}"
     )
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'

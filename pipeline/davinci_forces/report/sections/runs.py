@@ -109,16 +109,19 @@ def external_effort_panel(t: Track, *spans: VSpan) -> Panel:
 
 
 def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
-    """One table over all logs, and the remarks of the readers and of the first stages."""
+    """One table over all logs, and the remarks on the study, of the readers and of the stages."""
     yield from parts.paper_or_screen(overview(context, summaries))
-    diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage in ("ingest", "resample", "average")]
-    of_stages = [(diagnostic.stage, text) for diagnostic in diagnostics for text in diagnostic.text]
+    elsewhere = ("fit", "resolve", "sense")  # stages whose remarks stand beside what they are about
+    diagnostics = [d for d in context.catalogue.records(Diagnostic) if d.stage not in elsewhere]
+    of_stages = [("study.toml", text) for text in context.study.remarks]
+    of_stages += [(diagnostic.stage, text) for diagnostic in diagnostics for text in diagnostic.text]
     remarked = {summary.log: texts for summary in summaries if (texts := log_remarks(summary))}
-    followed = {diagnostic.subject.partition(".")[0] for diagnostic in diagnostics}  # logs with remarks of the stages
+    of_logs = [d for d in diagnostics if d.stage in ("ingest", "resample", "average")]
+    followed = {diagnostic.subject.partition(".")[0] for diagnostic in of_logs}
     if clean := len({summary.log for summary in summaries} - followed - set(remarked)):
         every = clean == len(summaries)
         which = "Every log was" if every else f"{clean} of {count(len(summaries), 'log')} were"
-        yield Verdict("good" if every and not diagnostics else "info", f"{which} read without a remark.")
+        yield Verdict("good" if every and not of_logs else "info", f"{which} read without a remark.")
     yield from (Verdict("warn", f"**{literal(log)}**: {message('; '.join(texts))}.") for log, texts in remarked.items())
     stated = "the rate stated in study.toml"  # of a log without a clock
     signals = context.catalogue.records(Signal)
@@ -131,8 +134,8 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         yield Bullets(tuple(f"clock: {method}; velocity: {source}" for method, source in sources))
     if of_stages:
         yield Prose(
-            "Remarks of the file readers and of the stages `ingest`, `resample` and `average`, the first of each kind; "
-            "`davinci-forces guide messages` explains them:"
+            "Remarks on study.toml, of the file readers and of the stages, the first of each kind; `davinci-forces "
+            "guide messages` explains them:"
         )
         first = tuple(message(text) for _, text in first_of_each_kind(of_stages))
         yield Bullets(first)

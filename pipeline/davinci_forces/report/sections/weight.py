@@ -94,7 +94,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         f"that of the robot's chain. In study.toml {TURN_AROUND}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": f". The study states no mass, so none tests the scale of the efforts{others}.",
-        "taken": f", and {stated} This log gave a torque constant in use, so it is no test: weigh another mass.",
+        "taken": f", and {stated} A torque constant in use is what this log gives, so this is no test: weigh another.",
         "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor, most of all those of "
         f"{worst}, and where the mass hung.",
         "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it, too much to test the scale.",

@@ -9,7 +9,7 @@ from davinci_forces.maths.contact.detection import HALF, rounded_off, without_ro
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, is_singular, matrix, shared_correlations
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, TIP_JOINTS, is_singular, matrix, shared_correlations
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records.forces import Contact, Track
@@ -18,7 +18,6 @@ from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, TipBudg
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-TIP_JOINTS = 3  # number of joints that carry the tip; the wrist is assumed to be straight
 MAX_LOGS_CORRELATION = 20
 UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 

@@ -243,8 +243,8 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = (
-        "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level", *sought,
-        "Coverage",
+        "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level",
+        "Alarm level", *sought, "Coverage",
     )  # fmt: skip
     caption = (
         "Trust in the estimates, in the worst logs that no fit used, if there are any. The columns New path to Ceiling "
@@ -252,8 +252,9 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "and Coverage of the log in which it is lowest. New path: share of the run's motion that is unlike any fitted "
         "path; above 10 %, it tests the model. Model error: RMS of measured minus modelled effort, both low-passed, "
         "without noise. Relative error: model error over the RMS of the measured effort; $R^2$ includes the noise. "
-        "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are lower. Coverage: "
-        "share of free-space samples in the stated 95 % error band. ± is one standard error."
+        "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are lower; it judges "
+        "stated windows. Alarm level: above it, a contact is found that nobody stated. Coverage: share of free-space "
+        "samples in the stated 95 % error band. ± is one standard error."
     )
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
@@ -264,6 +265,7 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     space, sought, share = trusted.space, trusted.sought, percent(trusted.share)
     scored, free = (about.prefix if about is not None else "" for about in (trusted.prediction, space))
     error, level = context.number(f"{scored}.model_error", 2), context.number(f"{free}.detection_level", 2)
+    alarm = context.number(f"threshold.{trusted.joint}.alarm_level", 2, std=None)
     r2, ceiling = (context.number(f"{scored}.{name}", 4, std=None) for name in ("r2", "r2_ceiling"))
     size = context.size(space, "detection_level", sought, 3) if space is not None and sought else "–"
     wanted = (size,) if with_sought else ()
@@ -271,4 +273,5 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     if (band := trusted.narrowest) is not None:
         words = band_in_words(band.coverage, band.coverage_std)
         covers = percent(band.coverage) + (f", {words}" if words.startswith("too") else "")
-    return title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling, level, *wanted, covers
+    scores = title(trusted.joint), trusted.words, trusted.new_path, error, share, r2, ceiling
+    return *scores, level, alarm, *wanted, covers

@@ -15,7 +15,9 @@ from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 
 SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
 # In a warning of any stage that blames units, or leaves a joint without an answer, or free motion in doubt.
-COMES_FIRST = re.compile(r"check the units|its external effort is not estimated|something seems to touch the arm")
+COMES_FIRST = re.compile(
+    "check the units|its external effort is not estimated|something seems to touch the arm|A of .* counts as"
+)
 LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
@@ -40,12 +42,13 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     fitted = [log.name for log in context.study.logs if log.role == "identification"]
     lost = any(task.split(" ")[-1] in fitted for task in context.provenance.failures)
-    warnings = (
+    warnings = [("study.toml", text) for text in context.study.remarks]
+    warnings += [
         (diagnostic.stage, text)
         for diagnostic in context.catalogue.records(Diagnostic)
         for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True)
         if severity == "warning" and not (lost and text.startswith(LACKS_LOGS))
-    )
+    ]
     for stage, text in first_of_each_kind(warnings):
         by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
         weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size

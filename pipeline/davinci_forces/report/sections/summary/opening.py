@@ -5,6 +5,7 @@ from hashlib import sha256
 
 import numpy as np
 
+from davinci_forces.maths.mechanics.tip_force import TIP_JOINTS
 from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Number, Prose, Verdict, literal
@@ -28,8 +29,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         for t in fine
         if t.space is not None
     ]
-    kind = "alarm level" if len(levels) == 1 else "alarm levels"
-    parts = [f"efforts stand out from free motion above the {kind} of {as_list(levels)}"] if levels else []
+    parts = [f"an effort stands out from free motion above its alarm level: {as_list(levels)}"] if levels else []
     parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
     narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `levels` names the good
     unseen = [t for t in trusts if t.space is None]
@@ -58,6 +58,8 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
     for (path, why), joints in kinds.items():
         whose = "its" if len(joints) == 1 else "their"
         caution = f"so judge {whose} efforts with caution"
+        if path == "the fitted path":
+            caution = "and another path was not tested, on which it may err more"
         yield f"on {path} the model errs by {as_list(joints)}, {why or caution}"
 
 
@@ -87,6 +89,13 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
         yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched{beside}"
+    robot = context.study.robot
+    if robot.chain is not None and not context.catalogue.records(TipForce):
+        in_amperes = any(joint.effort for joint in robot.joints)
+        if len(robot.joints) > TIP_JOINTS:
+            yield f"No force at the tip: that takes an arm of {TIP_JOINTS} joints, and this one has {len(robot.joints)}"
+        elif in_amperes:
+            yield "No force at the tip: that takes the torque constants of all joints"
 
 
 def masses(context: Context) -> Iterator[str]:
@@ -95,8 +104,9 @@ def masses(context: Context) -> Iterator[str]:
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
         level, why = grade_of_mass(context, weight)
-        stated += ", which gave a torque constant in use: no test of it" * (why == "taken")
-        yield f"{WORDS.get(level, '')} **{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}".strip()
+        stated += ", which seems to have given a torque constant in use: no test of it" * (why == "taken")
+        graded = f": {WORDS[level]}" if level in WORDS else ""
+        yield f"**{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}{graded}"
 
 
 def stiffnesses(context: Context) -> Iterator[str]:
