@@ -107,6 +107,24 @@ def test_noise_of_parameters_is_that_of_refits_without_each_period_or_without_ea
     np.testing.assert_allclose(model_error.std_over_periods(part, 2), expected, rtol=1e-9)
 
 
+def test_no_log_is_left_out_as_a_whole_for_the_noise_of_parameters_that_it_alone_excites():
+    """The first of two logs repeats four times, the second, which alone excites one parameter, does not."""
+    rng, k = np.random.default_rng(0), np.arange(1200)
+    log, period, block = k // 600, np.where(k < 600, k // 150, 0), k % 600 // 100
+    Phi = rng.normal(size=(1200, 1, 2)) * np.where(log[:, None, None], 1.0, [1.0, 1e-9])
+    tau = Phi @ [1.0, 2.0] + rng.normal(size=(1200, 1))
+    by_block, by_period = (sum_equations(Phi, tau, n * log + of, 2 * n) for n, of in ((6, block), (20, period)))
+    part = SimpleNamespace(by_block=by_block, by_period=by_period, ridge=Ridge(0.0, np.ones(1), np.empty((0, 0))))
+    groups = [np.where(log == 0, period, block) == n for n in range(6)]
+    thetas = np.array([np.linalg.lstsq(Phi[~out, 0], tau[~out, 0])[0] for out in groups])
+    found = model_error.std_over_periods(part, 2)
+    np.testing.assert_allclose(found, np.sqrt(5 * thetas.var(axis=0)), rtol=1e-9)
+    assert found[1] < 0.2
+    numbers = model_error.numbers_of_periods(by_period.squares, 2)
+    assert numbers[:4].tolist() == [0, 1, 2, 3]
+    assert (numbers[20:] == -1).all()
+
+
 @pytest.mark.parametrize(("variance", "explained"), [(4.0, 0.03), (1.0, 0.0), (0.5, 0.0)])
 def test_a_change_of_a_parameter_is_squared_less_the_variance_that_noise_adds_in_the_other_model(
     monkeypatch, variance, explained

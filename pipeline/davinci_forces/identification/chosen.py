@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart
-from davinci_forces.identification.model_error import model_std, std_over_periods
+from davinci_forces.identification.model_error import model_std, numbers_of_periods, std_over_periods
 from davinci_forces.maths import selection
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.conic import nearest
@@ -113,8 +113,8 @@ def choose(
 
 def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:
     """Score a candidate on periods left out, on the path of the fitted ones; NaN with its error if no path repeats."""
-    number = np.tile(np.arange(MAX_GROUPS), count)
     squares = np.concatenate([part.library.cells.by_period.squares for part in candidate.parts], axis=1)
+    number = numbers_of_periods(squares, count)
     groups = np.array([number == k for k in range(MAX_GROUPS) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
         return float("nan"), float("nan")

@@ -109,10 +109,23 @@ def std_over_blocks(part: CandidatePart, logs: int) -> Array:
 
 
 def std_over_periods(part: CandidatePart, logs: int) -> Array:
-    """Jackknife the standard errors (p,) of a model's parameters over periods, or over blocks of path without them."""
-    number, squares = np.tile(np.arange(selection.MAX_GROUPS), logs), part.by_period.squares.sum(axis=1)
-    repeats = len(np.unique(number[squares > 0])) > 1
-    return jackknife(part.by_period, part.ridge, number) if repeats else std_over_blocks(part, logs)
+    """Jackknife the standard errors (p,) of a model's parameters over periods, and blocks of path of logs without any.
+
+    Periods and blocks of one number are left out together, but never a whole log, which may alone excite parameters.
+    """
+    periods = numbers_of_periods(part.by_period.squares, logs)
+    blocks = np.tile(np.arange(selection.PATH_BLOCKS), logs)
+    blocks[np.repeat(periods[:: selection.MAX_GROUPS] >= 0, selection.PATH_BLOCKS)] = -1
+    number = np.concatenate([periods, blocks])
+    cells = (np.concatenate(both)[number >= 0] for both in zip(part.by_period, part.by_block, strict=True))
+    return jackknife(Equations(*cells), part.ridge, number[number >= 0])
+
+
+def numbers_of_periods(squares: Array, logs: int) -> Integers:
+    """The number (C,) of each cell's period, by the squared efforts (C, m) in it; -1 in logs that do not repeat."""
+    numbers = np.tile(np.arange(selection.MAX_GROUPS), (logs, 1))
+    periods = squares.any(axis=1).reshape(logs, -1).sum(axis=1)
+    return np.where(periods[:, None] > 1, numbers, -1).ravel()
 
 
 def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:

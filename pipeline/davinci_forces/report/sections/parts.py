@@ -111,8 +111,12 @@ def is_of_link(phi: str) -> bool:
 
 
 def converged_rows(t: Column) -> slice:
-    """The samples after the first second, of a short log a fifth: the filter's wide band before would hide them."""
-    return slice(int(np.searchsorted(t, t[0] + min(1.0, 0.2 * (t[-1] - t[0])))), None)
+    """The samples after the first second, in which the filter's band is wide, and before the last half second.
+
+    There the low-pass of the motion errs, as it has no later samples.  Of a short log a fifth and a tenth are left out.
+    """
+    first = min(1.0, 0.2 * (t[-1] - t[0]))
+    return slice(*np.searchsorted(t, [t[0] + first, t[-1] - 0.5 * first], "left").tolist())
 
 
 def spans(windows: Iterable[tuple[float, float]], name: str = "", colour: Colour = "orange") -> tuple[VSpan, ...]:

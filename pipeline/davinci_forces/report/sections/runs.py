@@ -81,7 +81,8 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     largest = float(abs(t.tau_ext_smooth[parts.converged_rows(t.t)]).max(initial=0.0))
     caption = (
         f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
-        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band."
+        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band; "
+        "without the first second and the last half of one, in which filter and low-pass err."
     )
     alt = f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}."
     panels = (
