@@ -27,7 +27,11 @@ from davinci_forces.filters.problem import FilterInput
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
+from davinci_forces.records import JointModel
+from davinci_forces.stages.forces import whiteness as explain
 from tests import arm
+from tests.report.report_records import record
+from tests.test_averaging import entry
 from tests.test_ekf import NOISE, T_S, matched, simulate, walk
 
 N = 4000
@@ -220,6 +224,17 @@ def test_contact_is_named_where_it_was_and_not_where_another_window_is_left_out(
     assert found.outcome == "left out"
     elsewhere = np.roll(TOUCHED, N // 2)
     assert not any(CONTACT in names for names in without(search(subject(run, free=elsewhere))))
+
+
+def test_no_contact_is_blamed_in_a_log_that_nothing_touched():
+    """What is left out there are rests and transients."""
+    found = search(subject(measured(pushed=1.0), free=TOUCHED))
+    model = record(JointModel, 10)
+    for about, words in ((entry(role="validation"), "rests and transients"), (entry(contact=((1.0, 2.0),)), CONTACT)):
+        said = explain.explanation(model, found, about, 0.0)
+        assert said.verdict.startswith(f"white outside {words}")
+        assert [name for name in said.without if words in name]
+        assert (CONTACT in said.verdict) == (words == CONTACT)
 
 
 def test_reversals_are_named_where_friction_jumps_at_them():

@@ -13,7 +13,7 @@ from davinci_forces.report.sections import parts
 
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
-    "left out": "white outside contact or reversals",
+    "left out": "white outside contact, reversals, rests or transients",
     "mended": "white once tested causes are removed",
     "unexplained": "not white even with all tested causes removed",
 }

@@ -20,7 +20,7 @@ MAX_BARS = 24  # periods in the bar plot
 def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     """A table of standard deviations, the tests of the noise, and the noise that averaging removed from each log."""
     yield Prose(
-        "Every identification log repeats one period. Its periods are averaged. Differences between periods are taken "
+        "The periods of an identification log whose motion repeats are averaged. Differences between periods are taken "
         "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
         "joints' motion repeats; remarks on the recordings name the samples outside this interval."
     )

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters.innovations.innovations import Innovations, correct_times, delays, innovations
-from davinci_forces.filters.innovations.search import CLOCK, MAX_SAMPLES_SEARCH, CauseSearch, Subject, search
+from davinci_forces.filters.innovations.search import CLOCK, CONTACT, MAX_SAMPLES_SEARCH, CauseSearch, Subject, search
 from davinci_forces.filters.problem import FilterInput, Recording, filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import Identified, LogModels, refit_effort
@@ -27,6 +27,7 @@ from davinci_forces.study import LogEntry
 LAGS = 100  # lags of the correlations in the report
 TESTED_LAGS = 20  # lags of the Ljung-Box statistic
 MIN_PROBABILITY = 0.01  # p-value of a test, above which a signal is called white
+NOT_JUDGED = "rests and transients"  # what is left out where no contact is known
 UNKNOWN_CONTACT = "; the study states no contact windows, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
 
@@ -191,12 +192,13 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     """The result of a search for the causes of innovations that are not white, trial by trial."""
     trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.possible_contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
+    omitted = CONTACT if entry.possible_contact else NOT_JUDGED
     return Explanation.like(
         model,
         finding=causes.outcome,
-        verdict=causes.verdict + caveat,
+        verdict=causes.verdict.replace(CONTACT, omitted) + caveat,
         clock_std=clock_std,
-        without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),
+        without=np.array([" + ".join(t.without).replace(CONTACT, omitted) or "nothing" for t in trials], object),
         explains=np.array([t in causes.explaining for t in trials], np.int64),
         left=np.array([t.tested for t in trials]),
         ljung_box_p_q=np.array([t.ljung_box[0] for t in trials]),
