@@ -62,8 +62,8 @@ def test_a_band_that_is_too_narrow_is_warned_of_by_logs_that_no_fit_used(small):
     assert not warnings(fitted, ("other", "validation", 0.9))
     told = warnings(fitted, ("other", "validation", 0.95), ("worse", "contact", 0.78))
     assert told == [
-        "warning: hand_roll: +-1.96 std covers 78 % of its free motion in worse, not 95 %; judge its external effort "
-        "by the alarm level"
+        "warning: hand_roll: as samples arrive, +-1.96 std covers 78 % of its free motion in worse, not 95 %; judge "
+        "its external effort by the alarm level"
     ]
     assert "50 %" in warnings(fitted)[0]
 

@@ -112,7 +112,8 @@ class Export:
             narrowest = min(spaces, key=lambda space: space.coverage, default=None)
             if narrowest is not None and narrowest.coverage < MIN_COVERAGE:
                 covers = f"+-1.96 std covers {100 * narrowest.coverage:.0f} % of its free motion in {narrowest.log}"
-                yield f"warning: {joint.name}: {covers}, not 95 %; judge its external effort by the alarm level"
+                text = f"{joint.name}: as samples arrive, {covers}, not 95 %"
+                yield f"warning: {text}; judge its external effort by the alarm level"
 
     def remarks(self) -> list[str]:
         """Name narrow bands, springs that are negative beyond their error, and parameters that physics has positive."""

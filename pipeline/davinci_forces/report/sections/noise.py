@@ -32,7 +32,8 @@ def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     header = ("Log", "Joint", "Period", "Position noise", "Velocity noise", "Effort noise", "Share")
     caption = (
         "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
-        "repeat, over the RMS effort. It is part of every relative residual, as no model can remove it."
+        "repeat, over the RMS effort. It is part of every relative residual, as no model can remove it. The error of a "
+        "period does not hold that of the clock, such as of a rate that study.toml states."
     )
     yield Table(caption, header, rows, "noise-table", "llrrrrr")
     yield tests(context, averages)
