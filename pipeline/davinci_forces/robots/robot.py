@@ -20,6 +20,7 @@ from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, in
 ANYWHERE = (-math.inf, math.inf)
 MOST_JOINTS = 200  # moving joints; the time grows with their square, to minutes; a humanoid with two hands has 80
 MOST_LINKS = 1000  # of a URDF, including fixed frames: sensors, tools, screws
+TIP_JOINTS = 3  # number of joints that carry the tip; the wrist is assumed to be straight
 
 
 class Kind(Enum):

@@ -28,7 +28,6 @@ from davinci_forces.maths.mechanics.kinematics import jacobian
 SINGULAR = 1e4
 # Above this condition number a force is marked: its error in one direction is a hundred times the error in another, for
 # example if a joint has a lever of about a centimetre at the tip.  Poses within Table 6.2 stay below.
-TIP_JOINTS = 3  # number of joints that carry the tip; the wrist is assumed to be straight
 NEAR_SINGULAR = 1e2
 DOUBLE = 1e-6  # [m] largest imaginary part of a double root: the square root of the rounding
 ARM = 3  # coordinates of the reduced Jacobian

@@ -27,7 +27,7 @@ from davinci_forces.study import LogEntry
 LAGS = 100  # lags of the correlations in the report
 TESTED_LAGS = 20  # lags of the Ljung-Box statistic
 MIN_PROBABILITY = 0.01  # p-value of a test, above which a signal is called white
-NOT_JUDGED = "rests and transients"  # what is left out where no contact is known
+OUTSIDE_MOTION = "rests and transients"  # what is left out where no contact is known
 UNKNOWN_CONTACT = "; the study states no contact windows, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
 
@@ -192,7 +192,7 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     """The result of a search for the causes of innovations that are not white, trial by trial."""
     trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.possible_contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
-    omitted = CONTACT if entry.possible_contact else NOT_JUDGED
+    omitted = CONTACT if entry.possible_contact else OUTSIDE_MOTION
     return Explanation.like(
         model,
         finding=causes.outcome,

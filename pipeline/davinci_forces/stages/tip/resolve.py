@@ -9,13 +9,13 @@ from davinci_forces.maths.contact.detection import HALF, rounded_off, without_ro
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, TIP_JOINTS, is_singular, matrix, shared_correlations
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, is_singular, matrix, shared_correlations
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records.forces import Contact, Track
 from davinci_forces.records.record import Diagnostic, diagnostic, join_names
 from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, TipBudget, TipContact, TipForce
-from davinci_forces.robots.robot import Robot
+from davinci_forces.robots.robot import TIP_JOINTS, Robot
 from davinci_forces.study import LogEntry
 
 MAX_LOGS_CORRELATION = 20

@@ -5,13 +5,13 @@ from hashlib import sha256
 
 import numpy as np
 
-from davinci_forces.maths.mechanics.tip_force import TIP_JOINTS
 from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass, hand_name
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, doubt_of_mass, percent, stiffness_level
+from davinci_forces.robots.robot import TIP_JOINTS
 from davinci_forces.study.review import STUDY
 
 MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
