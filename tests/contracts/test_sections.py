@@ -425,7 +425,7 @@ def test_a_narrow_band_of_a_log_whose_error_is_mostly_constant_offers_free_windo
     p = replace(used, model_error=0.05, mean_error=mean_error, mean_error_std=0.001, effort_rms=1.0)
     logs = Catalogue(lambda kind: [p if record is used else record for record in full.catalogue.records(kind)])
     space = replace(full.catalogue.records(FreeSpace)[0], log=p.log, detection_level=0.2, coverage=0.73)
-    [(_, text)] = caveats.looks_at_band(replace(full, catalogue=logs), Trust("hand_roll", p, space, None))
+    [(_, text)] = caveats.looks_at_narrow_bands(replace(full, catalogue=logs), [Trust("hand_roll", p, space, None)])
     assert ("an offset of the day, and of no interest, state `free` in that log" in text) == offered
 
 
@@ -679,11 +679,26 @@ def test_more_logs_are_not_the_remedy_for_a_narrow_band_of_a_wrong_model(full: C
     [trust] = trusts(full, hand_roll=0.05)
     assert trust.space is not None
     narrow = replace(trust, space=replace(trust.space, coverage=0.3))
-    [(_, text)] = caveats.looks_at_band(full, narrow)
+    [(_, text)] = caveats.looks_at_narrow_bands(full, [narrow])
     assert "it covers only 30 % of free-space samples. More logs of free motion" in text
     [wrong] = trusts(full, hand_roll=1.0)
-    [(_, text)] = caveats.looks_at_band(full, replace(wrong, space=narrow.space))
+    [(_, text)] = caveats.looks_at_narrow_bands(full, [replace(wrong, space=narrow.space)])
     assert "it covers only 30 % of free-space samples. See" in text
+
+
+def test_narrow_bands_of_several_joints_are_one_caveat(full: Context):
+    shares = {"hand_roll": 0.7, "hand_pitch": 0.5}
+    narrow = [
+        replace(t, space=replace(t.space, joint=t.joint, coverage=shares[t.joint]))
+        for t in trusts(full, hand_roll=0.05, hand_pitch=0.05)
+    ]
+    [(_, text)] = caveats.looks_at_narrow_bands(full, narrow)
+    start = f"**Hand roll and Hand pitch, {narrow[0].space.log}**: the 95 % band is too narrow: it covers only "
+    assert text.startswith(f"{start}70 % and 50 % of free-space samples.")
+    narrow[1] = replace(narrow[1], space=replace(narrow[1].space, log="other"))
+    [(_, text)] = caveats.looks_at_narrow_bands(full, narrow)
+    assert text.startswith(f"**Hand roll in {narrow[0].space.log} and Hand pitch in other**: ")
+    assert list(caveats.looks_at_narrow_bands(full, trusts(full, hand_roll=0.05))) == []
 
 
 def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Context):
@@ -1044,7 +1059,9 @@ def test_the_coverage_of_page_one_is_the_lowest_of_all_logs_that_were_not_fitted
     trusted = trust(about, "hand_roll")
     assert (trusted.space.log, trusted.narrowest.log) == ("check", "push")
     assert trusted.narrow
-    assert any("hand_roll" not in text and "push" in text for _, text in caveats.looks_at_band(about, trusted))
+    assert any(
+        "hand_roll" not in text and "push" in text for _, text in caveats.looks_at_narrow_bands(about, [trusted])
+    )
 
 
 def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):
@@ -1085,6 +1102,10 @@ def test_advice_that_a_failed_log_may_have_followed_is_not_on_page_one(full: Con
         failures = {f"ingest {roles[failed]}": "there is no channel 'q'"}
         about = replace(full, catalogue=records, provenance=replace(full.provenance, failures=failures))
         assert any("together" in text for _, text in caveats.looks_at(about, trusts(full, hand_roll=0.05))) == is_told
+    alone = [track for track in full.catalogue.records(Track) if track.joint == "hand_roll"]  # in no log with others
+    few = Catalogue(lambda kind: alone if kind is Track else records.records(kind))
+    about = replace(full, catalogue=few)
+    assert not any("together" in text for _, text in caveats.looks_at(about, trusts(full, hand_roll=0.05)))
 
 
 def test_a_joint_tested_on_its_own_path_comes_between_errors_of_a_third_and_of_a_half(full: Context):

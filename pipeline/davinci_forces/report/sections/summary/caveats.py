@@ -1,6 +1,7 @@
 """What a reviewer should look at first: every caveat with its weight."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -36,18 +37,21 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_parameters(context, trusted.joint)
         yield from looks_at_band(context, trusted)
+    yield from looks_at_narrow_bands(context, trusts)
     yield from looks_at_paths(context, trusts)
     yield from looks_at_reach(context, [trusted.joint for trusted in trusts])
     yield from looks_at_masses(context)
     omitted = max(map(omitted_share, context.catalogue.records(Spectrum)), default=0.0)
     fitted = [log.name for log in context.study.logs if log.role == "identification"]
     lost = any(task.split(" ")[-1] in fitted for task in context.provenance.failures)
+    moving = Counter(track.log for track in context.catalogue.records(Track) if not track.at_rest)
+    is_idle = lost or max(moving.values(), default=0) < 2  # advice on joints that move together in no log
     warnings = [("study.toml", text) for text in context.study.remarks]
     warnings += [
         (diagnostic.stage, text)
         for diagnostic in context.catalogue.records(Diagnostic)
         for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True)
-        if severity == "warning" and not (lost and text.startswith(LACKS_LOGS))
+        if severity == "warning" and not (is_idle and text.startswith(LACKS_LOGS))
     ]
     for stage, text in first_of_each_kind(warnings):
         by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
@@ -150,7 +154,7 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """Yield caveats where the detection level hides the effort sought, or the 95 % band is too narrow."""
+    """Yield a caveat where the detection level hides the effort sought."""
     space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
     if space is None:
         return
@@ -159,17 +163,31 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
-    if trusted.narrow and trusted.narrowest is not None:
-        space = trusted.narrowest
-        covers = f"the 95 % band is too narrow: it covers only {percent(space.coverage)} of free-space samples."
-        if not trusted.share > verdicts.CAUTION:  # more logs do not calibrate the band of a model that is wrong
-            covers += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
-            covers += "until then, judge an effort by the alarm level."
-        named = trusted.prediction.log if trusted.prediction is not None and trusted.share > verdicts.GOOD else ""
-        others = (p for p in scored_predictions(context, trusted.joint) if p.log == space.log != named)
-        covers += next((offset_remedy(context, p) for p in others), "")
-        weight = min(1.0 + 10 * (verdicts.COVERED[0] - space.coverage), MAX_NARROW)
-        yield weight, f"**{name}, {literal(space.log)}**: {covers}{see_runs}"
+
+
+def looks_at_narrow_bands(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
+    """Yield one caveat for all joints whose 95 % band is too narrow."""
+    narrow = [(t, t.narrowest) for t in trusts if t.narrow and t.narrowest is not None]
+    if not narrow:
+        return
+    logs = dict.fromkeys(literal(space.log) for _, space in narrow)
+    names = [title(t.joint) if len(logs) == 1 else f"{title(t.joint)} in {literal(space.log)}" for t, space in narrow]
+    where = as_list(names) + (f", {next(iter(logs))}" if len(logs) == 1 else "")
+    shares = as_list([percent(space.coverage) for _, space in narrow])
+    text = f"**{where}**: the 95 % band is too narrow: it covers only {shares} of free-space samples."
+    if not all(t.share > verdicts.CAUTION for t, _ in narrow):  # else more logs do not calibrate it: the model is wrong
+        text += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
+        text += "until then, judge an effort by the alarm level."
+    others = (
+        offset_remedy(context, p)
+        for t, space in narrow
+        for p in scored_predictions(context, t.joint)
+        if p.log == space.log and not (p == t.prediction and t.share > verdicts.GOOD)
+    )
+    text += next(filter(None, others), "")
+    least = min(space.coverage for _, space in narrow)
+    weight = min(1.0 + 10 * (verdicts.COVERED[0] - least), MAX_NARROW)
+    yield weight, f"{text}{see(context, Track, 'runs')}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
