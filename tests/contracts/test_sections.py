@@ -372,8 +372,8 @@ def test_what_study_toml_is_warned_of_is_looked_at_first_where_it_spoils_all_eff
     old = "study.toml:9: the setting 'derivative' no longer has an effect; remove it"
     context = replace(full, study=replace(full.study, remarks=(old, geared)))
     weights = {text: weight for weight, text in caveats.looks_at(context, []) if "study.toml" in text}
-    assert sorted(weights.values()) == [caveats.WARNING, caveats.FIRST]
-    assert weights[next(text for text in weights if "counts as" in text)] == caveats.FIRST
+    assert sorted(weights.values()) == [caveats.WARNING, caveats.FIRST_OF_ALL]
+    assert weights[next(text for text in weights if "counts as" in text)] == caveats.FIRST_OF_ALL
     listed = [block.items for block in walk(written("runs", context)) if isinstance(block, Bullets)]
     assert any("1 A of hand_roll counts as 426 N m" in text for items in listed for text in items)
 

@@ -14,11 +14,10 @@ from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import grade_of_mass, of_joint, scored_predictions
 from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 
-SPOILS_ALL = "resample"  # the stage whose warnings are of the measured motion, on which all else rests
+# Warnings of the measured motion, on which all else rests, and of the scale of efforts
+SPOILS_ALL = re.compile("^resample|A of .* counts as")
 # In a warning of any stage that blames units, or leaves a joint without an answer, or free motion in doubt.
-COMES_FIRST = re.compile(
-    "check the units|its external effort is not estimated|something seems to touch the arm|A of .* counts as"
-)
+COMES_FIRST = re.compile("check the units|its external effort is not estimated|something seems to touch the arm")
 LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
@@ -55,7 +54,8 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     ]
     for stage, text in first_of_each_kind(warnings):
         by_size = omitted / verdicts.GOOD if stage == "differentiate" else WARNING
-        weight = FIRST_OF_ALL if stage == SPOILS_ALL else FIRST if COMES_FIRST.search(text) else by_size
+        rank = FIRST if COMES_FIRST.search(text) else by_size
+        weight = FIRST_OF_ALL if SPOILS_ALL.search(f"{stage} {text}") else rank
         yield weight, message(text)
 
 
@@ -75,7 +75,8 @@ def looks_at_masses(context: Context) -> Iterator[tuple[float, str]]:
             share = abs(weight.mass / weight.stated_mass - 1.0)
             away = abs(weight.mass - weight.stated_mass) / weight.mass_std
             side = "large" if weight.mass > weight.stated_mass else "small"
-            text = f"the mass is estimated {100 * share:.2g} % too {side}, by {away:.1f} standard errors."
+            size = f"{share + 1.0:.3g} times too large" if share > 1.0 else f"{100 * share:.2g} % too {side}"
+            text = f"the mass is estimated {size}, by {away:.1f} standard errors."
             yield WARNING, f"**{literal(weight.log)}**: {text} See [@weight]."
 
 
