@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from davinci_forces.filters import FILTERS, filter_parts, tracker
-from davinci_forces.filters.problem import FilterInput, LongInput, NoiseModel
+from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.identification import joint_models
 from davinci_forces.maths import arrays
-from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Regressor
+from davinci_forces.maths.models.model import ArmMotion, Regressor
 from davinci_forces.maths.periods import harmonics
 from davinci_forces.maths.signals import smoothing, whiteness
 from davinci_forces.maths.signals.faults import beyond_steps
@@ -25,25 +24,6 @@ from tests.benchmarks.test_memory import hour_study, peak
 RATE, N, BLOCK = 1000.0, 3500, 1000  # the last block is shorter
 NOISE = NoiseModel(1e-4, 1e-3, 0.0, 1e-2, 0.05)
 BYTES = 155  # the most memory that a further sample of a joint takes, in any stage or the report
-
-
-@pytest.fixture
-def recording() -> FilterInput:
-    rng, t = np.random.default_rng(1), np.arange(N) / RATE
-    q, dq, ddq = np.sin(t), np.cos(t), -np.sin(t)
-    inertia, known = 0.4 + 0.1 * np.sin(3.0 * t), 0.2 * np.cos(t)
-    tau = inertia * ddq + 0.3 * dq + 0.2 * np.sign(dq) + known + 0.1 * rng.normal(size=N)
-    joint = JointDynamics(inertia, (0.0, 0.01, 0.0, 0.0, 0.3, 0.2, 0.0), known)
-    return FilterInput(joint, q + 1e-4 * rng.normal(size=N), dq + 1e-3 * rng.normal(size=N), ddq, tau, 1.0 / RATE, 0.1)
-
-
-@pytest.mark.parametrize("name", FILTERS)
-def test_a_filter_gives_the_same_bits_in_blocks_as_over_the_whole(monkeypatch, recording: FilterInput, name: str):
-    whole = tracker(name)(recording, NOISE)
-    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", BLOCK)
-    long = LongInput(N, recording.T_s, recording.initial_std, recording.part)
-    for column, expected in zip(filter_parts(name, [long], NOISE), whole, strict=True):
-        np.testing.assert_array_equal(column, expected)
 
 
 @pytest.mark.parametrize("period", [50.0, 1500.0])

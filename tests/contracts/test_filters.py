@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
-from davinci_forces.filters import FILTERS, diverges, kalman, title, tracker
-from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel
+from davinci_forces.filters import FILTERS, diverges, filter_parts, kalman, title, tracker
+from davinci_forces.filters.problem import Filter, FilterInput, LongInput, NoiseModel
 from davinci_forces.filters.sample import INITIAL_VARIANCE_RATIO
+from davinci_forces.maths import arrays
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
@@ -335,3 +336,20 @@ def test_a_filter_diverges_where_two_squared_innovations_are_beyond_a_multiple_o
 ):
     assert diverges(np.ones(50), 2.0 * 50.0 * share) == diverging
     assert diverges(np.where(np.arange(50) == 7, np.nan, 1.0), 2.0)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_filter_gives_the_same_bits_in_blocks_as_over_the_whole(monkeypatch, name: str):
+    """Of a recording at 1 kHz, in four blocks of which the last is shorter."""
+    rng, t, noise = np.random.default_rng(1), np.arange(3500) / 1000.0, NoiseModel(1e-4, 1e-3, 0.0, 1e-2, 0.05)
+    q, dq, ddq = np.sin(t), np.cos(t), -np.sin(t)
+    mass, known = 0.4 + 0.1 * np.sin(3.0 * t), 0.2 * np.cos(t)
+    tau = mass * ddq + 0.3 * dq + 0.2 * np.sign(dq) + known + 0.1 * rng.normal(size=len(t))
+    joint = JointDynamics(mass, (0.0, 0.01, 0.0, 0.0, 0.3, 0.2, 0.0), known)
+    measured = q + 1e-4 * rng.normal(size=len(t)), dq + 1e-3 * rng.normal(size=len(t))
+    whole = FilterInput(joint, *measured, ddq, tau, 1e-3, 0.1)
+    tracked = tracker(name)(whole, noise)
+    monkeypatch.setattr(arrays, "BLOCK_SAMPLES", 1000)
+    long = LongInput(whole.samples, whole.T_s, whole.initial_std, whole.part)
+    for column, expected in zip(filter_parts(name, [long], noise), tracked, strict=True):
+        np.testing.assert_array_equal(column, expected)

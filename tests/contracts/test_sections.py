@@ -591,6 +591,8 @@ def test_a_unit_fault_that_the_filter_finds_comes_before_harmonics_and_a_small_h
     looks = caveats.first_looks_in_order(about, [])
     assert looks[0] == remarks["ekf"]
     assert looks.index(remarks["differentiate"]) == place
+    assert caveats.omitted_share(cut) == share
+    assert caveats.omitted_share(replace(cut, harmonics=3)) == 0.0
 
 
 @pytest.mark.parametrize(("value", "is_told"), [(-0.3, True), (-0.1, False), (0.3, False)])

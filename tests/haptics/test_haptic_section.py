@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.records import HapticResponse, HapticRun, Origin, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.report.content import Figure, OnScreen, Section, walk
+from davinci_forces.report.content import Figure, OnScreen, Prose, Section, walk
 from davinci_forces.report.content.marks import VSpan
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
@@ -47,9 +47,10 @@ def test_contact_is_shaded_where_the_arm_presses():
     assert (last.start, last.end) == (5.01, 9.99)  # to the last sample
 
 
-def test_all_is_on_screen_only_and_says_that_it_is_simulated():
+def test_figures_are_on_screen_only_and_all_say_that_they_are_simulated():
     section = written(run(), read(HapticResponse("davinci", "the thesis", *[1.0] * 5, *[np.ones(3)] * 3)))
-    assert [type(block) for block in section.blocks] == [OnScreen]
+    assert [type(block) for block in section.blocks] == [Prose, OnScreen]
+    assert "This is **simulated**, not recorded" in section.blocks[0].text
     folded = section.blocks[-1]
     shown = [block for block in walk(folded) if isinstance(block, Figure)]
     assert len(shown) == 2
