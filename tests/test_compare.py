@@ -131,7 +131,8 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     assert roll.splitlines()[-1] == "  and 5 of model, 1 of forces, 1 of noise, 4 of candidates: --all lists them"
     every = call("compare", a, b, "--all").split("\n\n")[1].splitlines()
     assert [line.split()[1] for line in every[-6:]] == [
-        "ekf-euler.a.roll.level", "noise.a.roll.sigma", "cv.a.roll.lse.model_error", *(f"fit.roll.lse.p{i}" for i in (2, 1, 0)),
+        "ekf-euler.a.roll.level", "noise.a.roll.sigma", "cv.a.roll.lse.model_error",
+        *(f"fit.roll.lse.p{i}" for i in (2, 1, 0)),
     ]  # fmt: skip
     assert "slide: 1 changed" in slide
     assert "not of one joint: 1 changed" in other

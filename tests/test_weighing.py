@@ -580,7 +580,7 @@ def test_a_torque_constant_at_a_joint_that_slides_is_a_force_per_ampere_wherever
     joints = tuple(replace(joint, gear_ratio=gear_ratio) for joint in ROBOT.joints)
     joint = next(joint for joint in joints if joint.name == name)
     proposed = TorqueConstant("heavy", name, 0.4, 40.0, 48.0, 0.5)
-    assert f"48 ± 0.5 {unit} with gear_ratio = {gear_ratio:g}; 40 is used" in weigh.proposal(proposed, joint)
+    assert f"48.00 ± 0.50 {unit} with gear_ratio = {gear_ratio:g}; 40 is used" in weigh.proposal(proposed, joint)
     task = Task("weigh", "heavy", Fingerprint({}, {}, {}, {}, {}, ""), joints={j.name: j.for_units for j in joints})
     with execution.record_writer(Folders(tmp_path, tmp_path, tmp_path), task) as writer:
         place = writer.write(proposed)
