@@ -1,9 +1,12 @@
 """Every section of the report: of a study that has everything, of one that has nothing, and of any in between."""
 
+import ast
 import re
 from dataclasses import replace
 from hashlib import sha256
 from importlib import import_module
+from pathlib import Path
+from string import Formatter
 
 import numpy as np
 import pytest
@@ -142,6 +145,17 @@ def test_a_study_that_has_everything_has_the_section(name: str, full: Context):
     assert section.title
     names = [label for block in walk(section) if (label := name_of(block))]
     assert len(set(names)) == len(names)
+
+
+def test_every_explanation_is_used_with_the_values_of_its_braces():
+    given = {}
+    for source in Path(parts.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).removeprefix("parts.") == "explanation":
+                given[ast.literal_eval(node.args[0])] = {value.arg for value in node.keywords}
+    texts = parts.chapters("explanations.md")
+    braces = {name: [field for _, field, *_ in Formatter().parse(text) if field] for name, text in texts.items()}
+    assert given == {name: {field.partition(".")[0] for field in fields} for name, fields in braces.items()}
 
 
 @SECTION

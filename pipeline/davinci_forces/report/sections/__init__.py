@@ -3,7 +3,8 @@
 section(context: Context) -> Section | None        None if a study has no such content
 
 They share `parts`, where `section_of` makes this function of one that yields blocks.  What they explain before their
-numbers stands in explanations.md, and the methods in methods.md, by the kind of record that each one makes.
+numbers and in captions stands in explanations.md, by the name of the section, table or figure.  The methods stand in
+methods.md, by the kind of record that each one makes.
 """
 
 # The file, the title and the sections of each document.

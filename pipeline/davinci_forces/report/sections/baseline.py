@@ -7,7 +7,7 @@ from davinci_forces.report.changes import Change, StatedValue, changes
 from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Table, in_format, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.parts import paper_or_screen, section_of
+from davinci_forces.report.sections.parts import explanation, paper_or_screen, section_of
 
 MAX_ROWS = 300  # of a table; `davinci-forces compare` prints all changes
 
@@ -29,10 +29,7 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
     shared = sum(key in context.results for key in before)
     yield Prose(
         f"This report shares {count(shared, 'number')} with its baseline, `{literal(context.study.baseline)}`. "
-        f"{len(changed)} of them changed. New numbers: {len(came)}; missing: {len(went)}. A number has "
-        "changed if it differs by more than two standard errors of the difference, $sqrt(s_a^2 + s_b^2)$, or without "
-        "standard errors by more than $10^(-9)$ of it. Between independent recordings, one number in twenty that has a "
-        "standard error changes by chance."
+        f"{len(changed)} of them changed. New numbers: {len(came)}; missing: {len(went)}. {explanation('baseline')}"
     )
     if changed:
         rows = [

@@ -26,15 +26,7 @@ def section(context: Context) -> Iterator[Block]:
         yield from by_time(context, contacts)
         states_some = any(contact.stated.any() for contact in contacts)
         outside = " outside the windows that the study states" if states_some else ", as the study states no window"
-        caption = (
-            f"Contacts, log by log; the PDF has the {PRINTED} with the largest ratio of peak to detection level. "
-            "No.: number of the window in [@contact-peaks]; keys of results.json count within each log. Peak: to "
-            "compare with the largest reading of a gauge. Middle half: the mean over the middle half of the time from "
-            "onset to release, to compare with a steady reading. Impulse: of the stated window, or from onset to "
-            "release. Verdict: whether the peak exceeds the detection level; “peak only” if it does but stays below "
-            f"the alarm level; “found” for a contact{outside}, and “small” if its peak "
-            "is below twice the alarm level, so that it may be an error of the model."
-        )
+        caption = explanation("contact-table", most=PRINTED, outside=outside)
         header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Middle half", "Impulse", "Verdict")
         earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
         of_contacts: list[tuple[Cell, ...]] = []
@@ -48,13 +40,7 @@ def section(context: Context) -> Iterator[Block]:
         yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
-            yield Prose(
-                f"**{', '.join(unknown)}**: where nothing touched the arm is not stated, so the levels do not know its "
-                "path. A small contact that comes back with the period, or at reversals, is an error of the model. "
-                "State windows in which nothing touched the arm, `free = [[start, end], ...]`, and the levels hold for "
-                "this path, too. If nobody wrote them down, take times at least a second away from the contacts above. "
-                "`contact` may be stated, too; all other times then count as unknown."
-            )
+            yield Prose(explanation("contacts-unknown", logs=", ".join(unknown)))
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
         columns = ("Log", "Joint", "Reason, and remedy")
@@ -113,14 +99,9 @@ def peaks(context: Context, contacts: list[Contact]) -> Figure:
     joints = context.joints_of(contacts)
     missed = sum(int((contact.above == 0).sum()) for contact in contacts)
     total = sum(len(contact) for contact in contacts)
-    caption = (
-        "The peak of every window with its standard error: what the robot exerts, the opposite of a push on it. Peaks "
-        "in the grey band, below the detection level, cannot be distinguished from free space. [@contact-table] has "
-        "the window of each number."
-    )
     alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
     panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))
-    return Figure(caption, alt, panels, "contact-peaks", columns=min(len(panels), 3), height=45)
+    return Figure(explanation("contact-peaks"), alt, panels, "contact-peaks", columns=min(len(panels), 3), height=45)
 
 
 def peak_panel(contacts: list[Contact], named: bool) -> Panel:

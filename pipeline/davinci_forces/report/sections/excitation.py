@@ -6,7 +6,7 @@ from davinci_forces.records import Excitation
 from davinci_forces.report.content import Block, Figure, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import HLine, Line
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import section_of
+from davinci_forces.report.sections.parts import explanation, section_of
 
 SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, corrected", "found": "designed here"}
 MOTION = {"q": "position", "dq": "velocity", "ddq": "acceleration"}
@@ -16,10 +16,7 @@ MOTION = {"q": "position", "dq": "velocity", "ddq": "acceleration"}
 def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     """Objectives and limits of every trajectory.  Fig 6.5, Table 6.1"""
     yield Prose(
-        "The smaller the objective $-log_10 det(F^T F)$ over 300 samples of a period, the better a trajectory "
-        "separates the parameters. Position, velocity and acceleration must keep their limits at every instant, so the "
-        "extremes are computed, not sampled. Trajectories designed here are the best of several searches without "
-        "limits: the harmonics are scaled until they reach a limit; the mean may lie anywhere in the remaining range."
+        explanation("excitation")
         + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
     )
     rows, names = [], ("a0", "a1", "b1", "a2", "b2")

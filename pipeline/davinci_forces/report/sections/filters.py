@@ -18,12 +18,7 @@ def section(context: Context, noises: list[FilterNoise]) -> Iterator[Block]:
     spaces = [space for noise in noises if (space := context.worst_space(noise.joint)) is not None]
     worst = [t for space in spaces for t in context.catalogue.select(Track, log=space.log, joint=space.joint)]
     if worst:
-        yield Prose(
-            "The stated standard deviation of the external effort combines two parts ([@error-budget]): the "
-            "smoother's, from noise and random walk, and the model's, from free motion of other logs ([@methods]). The "
-            "offset of the day (a constant effort that differs from day to day) may be estimated from windows without "
-            "contact and removed; then the error of this estimate is added."
-        )
+        yield Prose(explanation("error-parts"))
         yield budget(context, worst)
         yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
@@ -52,13 +47,7 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     over_logs = ("coverage", "band_width")
     rows = tuple((*run_row(context, t, keys), *context.numbers(f"band.{t.joint}", over_logs, 2)) for t in tracks)
     header = ("Joint", "Worst free run", "Smoother", "Model", "RMS", "Coverage", "Mean coverage", "Half-width")
-    caption = (
-        "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
-        "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
-        "Mean coverage: of all logs that were not fitted, with its standard error over logs (with "
-        "fewer than 3 logs, over blocks of time). Half-width: the mean half-width of the bands of these logs."
-    )
-    return Table(caption, header, rows, "error-budget", "llrrrrrr")
+    return Table(explanation("error-budget"), header, rows, "error-budget", "llrrrrrr")
 
 
 def run_row(context: Context, t: Track, keys: Sequence[tuple[str, str]]) -> tuple[Cell, ...]:
@@ -71,15 +60,9 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
     """Smoother and filter on the worst free run of each joint, and the delay and lag of the filter."""
     keys = [(prefix, name) for name in ("free_rms", "detection_level") for prefix in ("effort", "ekf")]
     rows = tuple(run_row(context, t, (*keys, ("ekf", "push_delay"), ("ekf", "lag_part"))) for t in tracks)
-    caption = (
-        "The cost of real time. The report's results are those of the smoother, which uses samples before and after "
-        "each instant. In real time only the filter is available. RMS and level: RMS and detection level in free "
-        "space. Delay: of the filter's peak after that of a push of 1 s. Lag error: the standard deviation that the "
-        "filter's lag causes."
-    )
     compared = (f"{what}, {which}" for what in ("RMS", "Level") for which in ("smoother", "filter"))
     header = ("Joint", "Worst free run", *compared, "Delay", "Lag error")
-    return Table(caption, header, rows, "real-time-cost", "llrrrrrr")
+    return Table(explanation("real-time-cost"), header, rows, "real-time-cost", "llrrrrrr")
 
 
 def stream_table(context: Context, logs: list[Streamed]) -> Table:
@@ -90,15 +73,8 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
         of_log, prefix = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}"
         of_joint = context.number(f"{prefix}.alarm_level", 2), context.count(f"{prefix}.contacts_found")
         rows.append((*run_cells(s)[::-1], *of_log, *of_joint))
-    caption = (
-        "The same filter as samples arrive, as `davinci_forces.stream` and the exported ROS 2 package run it: it also "
-        "computes the motion without later samples. Delay: of the motion, in addition to the filter's. RMS: of the "
-        "external effort in free motion, and over that of the smoother. Peaks: the median of contacts that last three "
-        "delays, over the smoother's. Alarm level: free motion like that of the joint's logs crosses it at most "
-        "once in ten minutes. Contacts found: the number of contacts in all of the joint's logs that exceed it."
-    )
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
-    return Table(caption, header, rows, "stream", "llrrrrrr")
+    return Table(explanation("stream"), header, rows, "stream", "llrrrrrr")
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
@@ -108,13 +84,8 @@ def comparison(context: Context, compared: list[Comparison]) -> Table:
     for c in compared:
         numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
         rows.append((title(c.joint), name_of(c.filter), *numbers))
-    caption = (
-        "Filters compared on each joint's worst run in free space. Each has the smallest random walk with which it "
-        "follows a push. RMS and detection level: of the external effort in free motion. Peak ratio and delay: the "
-        "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
-    )
     header = ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay")
-    return Table(caption, header, rows, "filter-comparison", "llrrrr")
+    return Table(explanation("filter-comparison"), header, rows, "filter-comparison", "llrrrr")
 
 
 def name_of(label: str) -> str:

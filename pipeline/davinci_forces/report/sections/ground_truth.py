@@ -12,7 +12,7 @@ from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Tab
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.content.number import in_format
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import F, first_on_paper, of_joint, run_name, section_of
+from davinci_forces.report.sections.parts import F, explanation, first_on_paper, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import truth_level
 
 PUSH_SHAPES = {
@@ -39,11 +39,7 @@ def section(context: Context) -> Iterator[Block]:
     """Parameters and external efforts, estimated and true; only of a simulated study."""
     if not context.study.truth:
         return
-    yield Prose(
-        "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
-        "analysis reads it. This section compares external efforts with it, and parameters where the filter's model "
-        "has terms for all of the friction that was put in."
-    )
+    yield Prose(explanation("truth"))
     yield from effects(context)
     errors: list[float] = []
     fitted = {fit.group for fit in context.own_fits()}
@@ -85,12 +81,7 @@ def effects(context: Context) -> Iterator[Table]:
     if rows:
         rows.append(("Motors", "rotor inertia", "see truth.toml", "part of the inertia", "–"))
         rows.append(("Motors", "windings, limits of current and voltage", "see truth.toml", WITHOUT_TERM, "–"))
-        caption = (
-            "What was put into the arm, in SI units; the terms that represent it; and their values in the model that "
-            "the filter used. Coulomb friction is the mean of its levels up and down, and half their difference is an "
-            "offset or a part of gravity. Presliding friction is the part of Coulomb friction that reverses gradually."
-        )
-        yield Table(caption, ("Joint", "Effect", "Put in", "Term", "Estimated"), rows, "put-in", "llllr")
+        yield Table(explanation("put-in"), ("Joint", "Effect", "Put in", "Term", "Estimated"), rows, "put-in", "llllr")
 
 
 def used_parameters(context: Context, joint: str) -> dict[str, str]:

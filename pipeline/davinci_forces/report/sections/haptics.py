@@ -7,7 +7,7 @@ from davinci_forces.records import HapticResponse, HapticRun
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
 from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, MS, hand_name, section_of, spans_where
+from davinci_forces.report.sections.parts import MM, MS, explanation, hand_name, section_of, spans_where
 
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
@@ -24,13 +24,7 @@ def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
 def experiment(context: Context, responses: list[HapticResponse]) -> str:
     """Describe the simulated experiment."""
     thesis = context.compares_with_thesis
-    text = (
-        f"This is **simulated**, not recorded{': the experiment of the thesis’s section 8.4' if thesis else ''}. A "
-        "hand (a mass on a spring and a damper) holds the haptic device. A link sends its position to the arm, whose "
-        "cascaded controllers follow it against friction and tissue. The extended Kalman filter estimates the force "
-        "from the arm's position, velocity and current, one sample at a time, as in all logs. The link sends this "
-        "force back, and the device holds it until the next message."
-    )
+    text = explanation("haptics", whose=": the experiment of the thesis’s section 8.4" if thesis else "")
     if not responses:
         return text
     response = responses[0]

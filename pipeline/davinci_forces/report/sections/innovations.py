@@ -51,11 +51,7 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
     within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
-    caption = (
-        "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
-        f"innovation over its stated variance, which is 1 if that variance is right.{within} The PDF has the "
-        f"{PRINTED_RUNS} runs with the smallest p-values."
-    )
+    caption = parts.explanation("innovation-verdicts", within=within, most=PRINTED_RUNS)
     header = ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict")
     order = sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])
     return Table(caption, header, rows, "innovation-verdicts", "llrrl", tuple(sorted(order[:PRINTED_RUNS])))
@@ -69,11 +65,7 @@ def tests(context: Context, explained: list[Explanation]) -> Table:
         numbers = context.numbers(key, ("nis_mean", "acf1_q", "acf1_dq"), 2)
         white = context.probabilities(key, ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq"))
         rows.append((*parts.run_cells(e), *numbers, *white, context.number(f"{key}.clock_std", 2)))
-    caption = (
-        "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
-        "autocorrelations (ACF); p-values of the Ljung-Box test and of the cumulative periodogram for white noise. "
-        "Times: the error of the sample times, if the other joints of the log show the same error."
-    )
+    caption = parts.explanation("innovation-table")
     by_signal = (f"{test}, ${x}$" for test in ("ACF(1)", "Ljung-Box", "Periodogram") for x in ("q", "dot(q)"))
     return Table(caption, ("Log", "Joint", "NIS", *by_signal, "Times"), rows, "innovation-table", "llrrrrrrrr")
 
@@ -112,11 +104,7 @@ def figure(context: Context, e: Explanation) -> Figure:
         *(with_motion(moved[field], of) for field, of in INNOVATION_FIELDS if field in moved),
     )
     firsts = " and ".join(in_format(w.acf1, ".2f") for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
-    caption = (
-        f"{name}, the worst run of this joint: innovations, their autocorrelation, their cumulative periodogram "
-        "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "
-        "95 % (grey) and 99 % (blue)."
-    )
+    caption = parts.explanation("innovations-figure", run=name)
     alt = f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}."
     return Figure(caption, alt, panels, f"innovations-{e.log}-{e.joint}", columns=2, height=30)
 

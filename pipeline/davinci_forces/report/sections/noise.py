@@ -9,38 +9,29 @@ from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spec
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.marks import Bars, Histogram, Line, Points
 from davinci_forces.report.context import Context, count, label
-from davinci_forces.report.sections.parts import autocorrelation, normal_plot, run_cells, run_name, section_of
+from davinci_forces.report.sections import parts
 from davinci_forces.report.verdicts import MAX_PERIOD_NOISE
 
 NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
 MAX_BARS = 24  # periods in the bar plot
 
 
-@section_of("Averaging and noise", "noise", Average)
+@parts.section_of("Averaging and noise", "noise", Average)
 def section(context: Context, averages: list[Average]) -> Iterator[Block]:
     """A table of standard deviations, the tests of the noise, and the noise that averaging removed from each log."""
-    yield Prose(
-        "The periods of an identification log whose motion repeats are averaged. Differences between periods are taken "
-        "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
-        "joints' motion repeats; remarks on the recordings name the samples outside this interval."
-    )
+    yield Prose(parts.explanation("noise"))
     rows = []
     for a in averages:
         key, period = f"noise.{a.log}.{a.joint}", context.number(f"period.{a.log}", 6)
         share = context.number(f"{key}.relative_noise", 2, std=None)
-        rows.append((*run_cells(a), period, *context.numbers(key, ("sigma_q", "sigma_dq", "sigma_tau")), share))
+        rows.append((*parts.run_cells(a), period, *context.numbers(key, ("sigma_q", "sigma_dq", "sigma_tau")), share))
     header = ("Log", "Joint", "Period", "Position noise", "Velocity noise", "Effort noise", "Share")
-    caption = (
-        "Noise between periods (standard deviations of one sample). Share: the low-passed effort noise that does not "
-        "repeat, over the RMS effort. It is part of every relative residual, as no model can remove it. The error of a "
-        "period does not hold that of the clock, such as of a rate that study.toml states."
-    )
-    yield Table(caption, header, rows, "noise-table", "llrrrrr")
+    yield Table(parts.explanation("noise-table"), header, rows, "noise-table", "llrrrrr")
     yield tests(context, averages)
     for average in averages:
         yield from outliers(context, average)
     folded = tuple(
-        OnScreen(run_name(a), f"noise-{a.log}-{a.joint}", figures)
+        OnScreen(parts.run_name(a), f"noise-{a.log}-{a.joint}", figures)
         for a in averages
         if (figures := tuple(average_figures(context, a)))
     )
@@ -56,13 +47,8 @@ def tests(context: Context, averages: list[Average]) -> Table:
         key = f"whiteness.{a.log}.{a.joint}.{signal}"
         tested = context.probabilities(key, ("ljung_box_p", "jarque_bera_p"))
         acf, *shape = context.numbers(key, ("acf1", "skewness", "kurtosis"), 2)
-        rows.append((*run_cells(a), meaning, acf, *tested, *shape))
-    caption = (
-        "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the p-values of the "
-        "Ljung-Box test (white) and of the Jarque-Bera test (normal). A p-value below 0.01 means no. Real encoders, "
-        "their derivative and a jittering clock give coloured noise (not white); the filter assumes white noise."
-    )
-    return Table(caption, header, rows, "noise-tests", "lllrrrrr")
+        rows.append((*parts.run_cells(a), meaning, acf, *tested, *shape))
+    return Table(parts.explanation("noise-tests"), header, rows, "noise-tests", "lllrrrrr")
 
 
 def outliers(context: Context, average: Average) -> Iterator[Verdict]:
@@ -77,7 +63,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
             noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MAX_PERIOD_NOISE * np.median(rms)]
             if noisy:
                 times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in noisy[:5])
-                name = f"**{run_name(average)}**"
+                name = f"**{parts.run_name(average)}**"
                 which = f"period{'' if len(noisy) == 1 else 's'} {', '.join(map(str, noisy[:5]))} of {len(rms)}"
                 message = f"{name}: {meaning} noise of {which} is {times} times that of the median period."
                 start = " The arm may not yet have settled: set `skip`." if noisy[0] == 1 else ""
@@ -100,20 +86,12 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
     if not (period_residuals and trajectories and spectra and signals):
         return
     whiteness = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
-    name = run_name(average)
-    caption = (
-        f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
-        "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "
-        "position and velocity."
-    )
+    name = parts.run_name(average)
     alt = f"{name}: the mean of {count(average.periods, 'period')}, the spectrum of its position, and its derivatives."
     panels = (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0]))
+    caption = parts.explanation("noise-period", run=name, periods=average.periods)
     yield Figure(caption, alt, panels, columns=2, height=42)
-    caption = (
-        f"{name}: the noise that averaging removed. Noise of each period over that of the median period; histogram of "
-        "the effort noise with the normal density of the same standard deviation; normal probability plot of the "
-        "position noise; autocorrelation of the velocity noise with the 95 % band of white noise."
-    )
+    caption = parts.explanation("noise-removed", run=name)
     alt = f"{name}: the noise of each period, and its distribution and autocorrelation."
     yield Figure(caption, alt, tuple(noise_panels(period_residuals[0], average, whiteness)), columns=2, height=42)
 
@@ -167,9 +145,9 @@ def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str
     edges, densities, grid, normal = histogram(residual.tau_noise)
     shape = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
     yield Panel("Effort noise", label(residual, "tau_noise", "effort"), "density", shape)
-    yield normal_plot("Position noise", residual.q_noise, label(residual, "q_noise", "position"))
+    yield parts.normal_plot("Position noise", residual.q_noise, label(residual, "q_noise", "position"))
     if w := whiteness.get("dq_noise"):
-        yield autocorrelation(w, "Velocity noise")
+        yield parts.autocorrelation(w, "Velocity noise")
 
 
 def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column]:

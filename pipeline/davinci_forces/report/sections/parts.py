@@ -27,12 +27,12 @@ THESIS_TISSUE = 457.24  # [N/m], section 8.2
 def chapters(name: str) -> dict[str, str]:
     """The chapters of a file of text beside this module, by heading; the lines of a paragraph are as in the file."""
     text = text_of(read_bytes(Path(__file__).with_name(name)))
-    return {heading: body.strip() for heading, body in re.findall(r"^# (\w+)\n(.*?)(?=^# |\Z)", text, re.M | re.S)}
+    return {heading: body.strip() for heading, body in re.findall(r"^# ([\w-]+)\n(.*?)(?=^# |\Z)", text, re.M | re.S)}
 
 
-def explanation(section: str, **values: str) -> str:
-    """What a section says before its numbers, from explanations.md, with the values of its braces."""
-    paragraphs = chapters("explanations.md")[section].split("\n\n")
+def explanation(chapter: str, **values: object) -> str:
+    """What a section says before its numbers, or a caption, from explanations.md, with the values of its braces."""
+    paragraphs = chapters("explanations.md")[chapter].split("\n\n")
     return "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs).format(**values)
 
 

@@ -16,12 +16,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield Prose(parts.explanation("prediction"))
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Relative error", "$R^2$", "Ceiling")
-    caption = (
-        "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit; share "
-        "of the run's path (the variance of its position) that no fitted path explains; model error; the mean "
-        "(constant part) of the difference, as from another payload; and the model error over the root mean square of "
-        "the effort."
-    )
+    caption = parts.explanation("prediction-table")
     rows = tuple(row(context, p) for p in used)
     yield from parts.paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))
     scores = (*estimators(context, predictions), every_score(context, predictions))
@@ -72,12 +67,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
         return
     keys = {fit: [f"{of[j].prefix}.model_error" if j in of else "" for j in joints] for fit, of in worst.items() if of}
     rows = tuple((fit_name(*fit), *(context.number(key, 3) for key in of_fit)) for fit, of_fit in keys.items())
-    caption = (
-        "Every fit compared: its model error in the worst unseen run of each joint. Models: independent (each joint by "
-        "itself) or coupled (the whole arm). Estimators: least squares (LSE), weighted (WLSE), total (TLS), bounded, "
-        "robust (Huber), with prior parameters, consistent (physically possible), instrumental variables (IV), "
-        "particle swarm (PSO)."
-    )
+    caption = parts.explanation("estimators-table")
     yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
 
 

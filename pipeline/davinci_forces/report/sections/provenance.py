@@ -6,20 +6,14 @@ from dataclasses import asdict
 from davinci_forces.records import LogSummary
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import paper_or_screen, section_of
+from davinci_forces.report.sections.parts import explanation, paper_or_screen, section_of
 
 
 @section_of("Provenance", "provenance")
 def section(context: Context) -> Iterator[Block]:
     """Everything needed to check whether a report comes from these files and this code."""
     provenance, study = context.provenance, context.study
-    yield Prose(
-        f"Made by davinci-forces {provenance.version}; the SHA-256 of its files begins with {provenance.code}. The "
-        "report ID on page one is the first half of the SHA-256 of `manifest.txt`. This file lists raw files, study "
-        "file, processed files and numbers, each with its own SHA-256. Two reports with the same ID have the same "
-        "content. `davinci-forces verify --id` checks whether the study and its report have a given ID. Every number "
-        "is in `results.json` under its own key, with the processed file and the field that it comes from."
-    )
+    yield Prose(explanation("provenance", version=provenance.version, code=provenance.code))
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."
     yield from paper_or_screen(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))

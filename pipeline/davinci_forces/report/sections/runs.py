@@ -59,12 +59,7 @@ def scores(context: Context, tracks: list[Track]) -> Table:
         for t in tracks
     )
     header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "By speed", "Band")
-    caption = (
-        "External effort in free space, where nothing touches the robot: its root mean square (RMS), the level that "
-        "99 % of samples stay below (detection level), and the share of samples in the 95 % band (coverage), also by "
-        "quartile of speed, standstill left out. A dash marks runs whose contacts are not known."
-    )
-    return Table(caption, header, rows, "free-space-table", "llrrrll")
+    return Table(parts.explanation("free-space-table"), header, rows, "free-space-table", "llrrrll")
 
 
 def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
@@ -79,11 +74,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = parts.run_name(t), parts.spans(context.study.log(t.log).contact, "stated contact")
     largest = float(abs(t.tau_ext_smooth[parts.converged_rows(t.t)]).max(initial=0.0))
-    caption = (
-        f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
-        "with a band of two standard deviations, and measured minus modelled effort unless its noise hides the band; "
-        "without the first second and the last half of one, in which filter and low-pass err."
-    )
+    caption = parts.explanation("runs-trace", run=name, why=f", {why}" if why else "")
     alt = f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}."
     panels = (
         Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),

@@ -7,7 +7,7 @@ from davinci_forces.records import SensorForce
 from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Band, Line
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import paper_or_screen, section_of
+from davinci_forces.report.sections.parts import explanation, paper_or_screen, section_of
 from davinci_forces.report.verdicts import band_in_words
 
 PUBLISHED_ERROR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
@@ -17,15 +17,7 @@ VECTOR = "vector"  # the axis that stands for all three
 @section_of("Against a force sensor", "sensor", SensorForce)
 def section(context: Context, forces: list[SensorForce]) -> Iterator[Block]:
     """A table of all logs with a sensor and of the best published error for this arm, and both forces over time."""
-    yield Prose(
-        "A sensor measured the force in these logs; nothing was fitted to it. The error is the estimated force minus "
-        "the sensor's at the same instant. The filter's first second and poses near a singularity are left out. The "
-        "lag is the delay of the sensor behind the estimate, from their correlation; it is part of the error. Coverage "
-        "is the share of samples at which the 95 % band, with the sensor's noise, contains the sensor's force.\n\nFor "
-        f"comparison: a neural network on the da Vinci Research Kit had an error of {100 * PUBLISHED_ERROR:.2f} % of "
-        "range (Yang et al. 2024, arXiv:2405.07453). That is the root mean square error, averaged over axes, over the "
-        "range averaged over axes; the row **vector** states the same here."
-    )
+    yield Prose(explanation("sensor", error=100 * PUBLISHED_ERROR))
     yield from paper_or_screen(table(context, forces))
     for i, log in enumerate(dict.fromkeys(force.log for force in forces)):
         shown = figure([force for force in forces if force.log == log])
@@ -41,13 +33,8 @@ def table(context: Context, forces: Sequence[SensorForce]) -> Table:
         numbers = context.numbers(f"sensor.{force.log}.{force.axis}", names)
         rows.append((literal(force.log), axis, *numbers, band_in_words(force.sensor_coverage)))
     rows.append(("Yang et al. 2024", "three axes", "–", "–", "–", "–", f"{PUBLISHED_ERROR}", "–", "–", "–"))
-    caption = (
-        "The estimated force minus the sensor's: root mean square (RMSE), mean (bias) and largest difference; the "
-        "range of the sensor's force, and the RMSE as a share of it; the lag of the sensor; the share of samples "
-        "within the 95 % band."
-    )
     header = ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "RMSE / range", "Lag", "Coverage", "Band")
-    return Table(caption, header, tuple(rows), "sensor-errors", "llrrrrrrrl")
+    return Table(explanation("sensor-errors"), header, tuple(rows), "sensor-errors", "llrrrrrrrl")
 
 
 def figure(forces: Sequence[SensorForce]) -> Figure:

@@ -10,7 +10,7 @@ from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stif
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line
 from davinci_forces.report.context import Context, label
-from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, hand_name, section_of
+from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, explanation, hand_name, section_of
 
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
 TISSUES: tuple[Colour, ...] = ("green", "sky", "yellow")
@@ -41,7 +41,7 @@ def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     """The stability limits of each simulated hand.  Section 8.3"""
     tissues = [tissue for tissue in context.catalogue.records(Stiffness) if tissue.pushes and tissue.stiffness > 0.0]
     yield from (verdict(context, limit, tissues) for limit in limits if tissues)
-    yield Prose(f"{model(context, limits)}\n\n{without_delay(context)}")
+    yield Prose(model(context, limits))
     yield limits_table(context, limits)
     caption = (
         "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
@@ -82,51 +82,24 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
 
 
 def model(context: Context, limits: list[HandLimit]) -> str:
-    """State the assumed hands, device, link and controller, and which of the limits are the same."""
+    """State the assumed hands, device, link and controller, which limits are the same, and what they prove.  Fig 8.9"""
     haptics = context.study.haptics
     late = MS * (haptics.position_delay + haptics.force_delay)
     delay = f"{late:g} ms of delay" if late else "no delay"
-    scales = f"motion is scaled by {haptics.device.motion:g} and force by {haptics.device.force:g}"
     origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
     rows = [(x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits]
     apart = [max(row) / min(row) - 1.0 for row in rows if np.isfinite(row).all()]
     agree = f"Here they agree within {100.0 * max(apart):.1f} %. " if apart else ""
-    return (
-        "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$; tissue is a "
-        f"spring $K_T$ on one side of its surface. The hands are assumed.{origin} The limit is that of a hand that is "
-        "pressed into elastic tissue and stays in contact. Formula, response and simulation state the same limit: the "
-        "formula takes the filter's lag and gain, from logs if there are any, at the frequency at which the hand would "
-        f"oscillate; the response and the simulation contain the filter itself. {agree}The last column of "
-        f"[@stability-table] says what each row includes. They also assume messages at {haptics.link_rate:g} Hz with "
-        f"{delay} but the wait for a message, and a controller at {haptics.rate:g} Hz; {scales}. State others, and "
-        "other hands, in a scenario: `davinci-forces haptics --template` prints one, with all that it assumes."
-    )
-
-
-def without_delay(context: Context) -> str:
-    """Explain what the map of Lyapunov functions proves, and what it does not prove.  Fig 8.9"""
     region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
-    return (
-        "A common quadratic Lyapunov function exists if and only if $K_T < b^2/m + 2 b sqrt(K_H/m)$; see "
-        "[@stability-limits]. This function covers tissue that switches at any time, but neither delay nor sampling. "
-        f"In {region} no such function exists, which proves nothing about real tissue. Real tissue acts only in "
-        "contact. Then $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls at the rate $b dot(x)^2$, if the "
-        "force comes at once. So delay and sampling set the limit, not switching. `davinci-forces stability` also "
-        "solves the linear matrix inequality of the function."
-    )
+    return explanation("stability", haptics=haptics, delay=delay, origin=origin, agree=agree, region=region)
 
 
 def limits_table(context: Context, limits: list[HandLimit]) -> Table:
     """The limits of all hands, with what each includes."""
     keys = [f"stability.{limit.hand}" for limit in limits]
     rows = tuple((name, *(context.number(f"{key}.{field}", 3) for key in keys), what) for field, name, what in ROWS)
-    caption = (
-        "Limits of the tissue's stiffness, and what they follow from. The standard error of the formula's limit "
-        "includes those of the filter's lag and gain, by a jackknife over segments of logs, and of the arm's "
-        "parameters. A dash marks a limit that was not found, or an error that is not known."
-    )
     header = ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes")
-    return Table(caption, header, rows, "stability-table", "l" + "r" * len(limits) + "l")
+    return Table(explanation("stability-table"), header, rows, "stability-table", "l" + "r" * len(limits) + "l")
 
 
 def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
@@ -173,15 +146,10 @@ def motions(context: Context) -> Iterator[Figure]:
         tuple(Line(getattr(run, x), getattr(run, y), *LAWS[run.switching], "solid") for run in runs)
         for x, y in (("hand_x", "hand_dx"), ("t", "hand_x"), ("t", "V"))
     )
-    caption = (
-        f"The same hand and tissue of {k_t}, above both limits of arbitrary switching. The motion is unstable under "
-        "the worst switching, and stable if the tissue acts only in contact. Under the worst switching V is not the "
-        "stored energy, so V can rise."
-    )
     alt = "A spiral that grows under the worst switching, and one that shrinks to rest if the tissue acts in contact."
     panels = (
         Panel("Phase plane", label(runs[0], "hand_x"), label(runs[0], "hand_dx"), phase),
         Panel("Position", "time [s]", label(runs[0], "hand_x"), position),
         Panel("Energy", "time [s]", label(runs[0], "V"), energy, y_log=True),
     )
-    yield Figure(caption, alt, panels, "stability-motion", columns=3, height=52)
+    yield Figure(explanation("stability-motion", stiffness=k_t), alt, panels, "stability-motion", columns=3, height=52)

@@ -78,30 +78,16 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
             window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s{remark}"
             numbers = *context.numbers(prefix, (*F, "peak")), context.number(f"{prefix}.sigma_1", 2)
             rows.append((literal(contact.log), window, *numbers, f"({weak})"))
-    caption = (
-        "The largest force at the tip in each contact, with standard deviations. Largest std: the standard deviation "
-        "along the least certain direction, which is the last column. “Found” marks a window that the study does not "
-        "state, “near singular” a pose in which the force is uncertain."
-    )
     header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
-    return Table(caption, header, rows, "tip-contacts", "llrrrrrl")
+    return Table(explanation("tip-contacts"), header, rows, "tip-contacts", "llrrrrrl")
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     """The force that is estimated in free space, and the condition of the poses."""
     names = ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular")
     rows = tuple((literal(force.log), force.role, *context.numbers(f"tip.{force.log}", names)) for force in forces)
-    caption = (
-        "The size of the estimated force at the tip in free space, where the true force is zero: root mean square "
-        "(RMS), and the levels that 95 % and 99 % (detection level) of samples stay below. Forces below the detection "
-        "level cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains "
-        "zero. Condition: the median condition number of the Jacobian, the ratio between the errors of the force in "
-        "its least and its most certain direction if all joints err alike. Near singular: samples with a condition "
-        f"number above {NEAR_SINGULAR:g}, as within about a centimetre of the remote centre of a da Vinci arm; these "
-        "samples are left out."
-    )
     header = ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular")
-    return Table(caption, header, rows, "tip-levels", "llrrrrrr")
+    return Table(explanation("tip-levels", limit=NEAR_SINGULAR), header, rows, "tip-levels", "llrrrrrr")
 
 
 def log_blocks(context: Context, force: TipForce) -> Iterator[Block]:

@@ -195,10 +195,4 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
             numbers = context.numbers(prefix, ("error", "tangent", "damping", "exponent"))
             rows.append((literal(model.log), name, *numbers, "chosen" if name == model.chosen else ""))
     if rows:
-        caption = (
-            "Models of the tissue. Stiffness and damping are at half the median depth of the pushes below first "
-            "contact; they check the stiffness of the log, which is the one to quote. Friction of a joint whose effort "
-            "is the force reverses with the motion, as damping does: slow pushes do not tell them apart, and the "
-            "standard error holds only the model's usual error."
-        )
-        yield Table(caption, header, tuple(rows), "tissue-models", "llrrrrl")
+        yield Table(explanation("tissue-models"), header, tuple(rows), "tissue-models", "llrrrrl")

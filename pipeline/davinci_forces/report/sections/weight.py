@@ -52,27 +52,15 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
         away = abs(constant.torque_constant - constant.torque_constant_used) / constant.torque_constant_std
         follows = "–" if math.isnan(away) else "keep" if away <= NORMAL_95 else "check"
         rows.append((*run_cells(constant), str(Number(constant.stated_mass, "kg")), used, proposed, follows))
-    caption = (
-        "Torque constants with which the current of one joint alone gives the known mass. These are proposals: to "
-        'apply one, write it as `torque_constant` in `[robot_overrides.<joint>]` of study.toml; a line `effort = "A"` '
-        "there is left out. They assume the stated mass, its position and the gear ratio. Joints whose current shows "
-        "the mass too imprecisely are left out. Keep: the one in use lies in the 95 % interval; check: it does not, so "
-        "check mass, position, gear and motor."
-    )
     header = ("Log", "Joint", "Known mass", "Used", "Proposed", "In use")
-    return Table(caption, header, rows, "torque-constants", "llrrrl")
+    return Table(explanation("torque-constants"), header, rows, "torque-constants", "llrrrl")
 
 
 def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     """The content about one log."""
     if weight.tare:
         apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
-        yield Prose(
-            f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to "
-            f"the model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ "
-            "by this amount. The error of the model repeats along the path and cancels, so the standard error does not "
-            "include it. A change between the two runs remains in the estimated mass."
-        )
+        yield Prose(explanation("tare", run=literal(weight.tare), mass=apparent))
     loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
     if loads := [load for load in loads if load.joint in weight.loaded]:
         yield figure(weight, loads)
@@ -141,13 +129,6 @@ def by_joint(context: Context, weight: Weight) -> Table:
     together = (
         f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
     )
-    caption = (
-        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at its position and "
-        "mirrored. False mass: the root mean square of the mass that the joint shows in logs without a mass, which the "
-        "standard error of the mass includes; 0 where a tare is subtracted, as it cancels."
-        f"{together if len(rows) > 1 else ''} Offset: that of the day; – where a constant effort cannot be told from "
-        "the mass, which it then shifts. Residual: what is left with the mass, root mean square. Free motion: the "
-        "model's error there, likewise."
-    )
+    caption = explanation("weight-joints", log=literal(weight.log), agreement=together if len(rows) > 1 else "")
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")
     return Table(caption, header, rows, f"weight-joints-{weight.log}", "lrrrrrr")

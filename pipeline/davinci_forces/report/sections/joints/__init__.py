@@ -160,12 +160,7 @@ def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
         if rows:
             header = ("", *PARAMETER_HEADER)
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
-            caption = (
-                f"Parameters of the links, by the model “{fit_name(fit.model, fit.estimator)}”; they act on {moved}. "
-                "Only combinations of masses, centres and inertias affect an effort; each is named after its first "
-                "parameter. “mx of 2” is the mass of link 2 times the x of its centre, in axes with z along its joint; "
-                "links are numbered from the base."
-            )
+            caption = explanation("joints-links", model=fit_name(fit.model, fit.estimator), joints=moved)
             body = tuple(parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1))
             tables.append(Table(caption, header, body, f"links-{fit.group}", "lllrrrr"))
     return tuple(tables)

@@ -8,7 +8,7 @@ from davinci_forces.records import Fit, FrictionMap, Identifiability, Residual, 
 from davinci_forces.report.content import Block, Figure, Panel, Prose, in_format
 from davinci_forces.report.content.marks import Colour, Line, Points, Tiles
 from davinci_forces.report.context import Context, estimator_name, label, name_in_sentence, title
-from davinci_forces.report.sections.parts import run_name
+from davinci_forces.report.sections.parts import explanation, run_name
 
 LOOKS: dict[str, Colour] = {
     "lse": "vermillion", "wlse": "blue", "pso": "green", "consistent": "purple", "tls": "orange",
@@ -80,11 +80,7 @@ def correlations(context: Context, joint: str) -> Iterator[Block]:
     for record in context.catalogue.select(Identifiability, group=joint):
         names = tuple(dict.fromkeys(map(str, record.parameter)))
         number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
-        yield Prose(
-            f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
-            "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
-            "difference of the two parameters is known well."
-        )
+        yield Prose(explanation("joints-correlation", condition=number))
         pairs = zip(record.correlation.tolist(), record.parameter, record.beside, strict=True)
         strongest = max((abs(r) for r, a, b in pairs if a != b), default=0.0)
         numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
@@ -101,12 +97,7 @@ def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
         return
     shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:MAX_PANELS]
     more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
-    caption = (
-        f"{title(joint)}: friction (the effort minus all other terms of the model) over velocity, while the joint "
-        "gains speed and while it loses speed, and the model's friction. Points are means in bins of "
-        "velocity, bars their standard deviations. If the two branches differ, friction depends on the past, or "
-        f"changes more slowly than the sign of the velocity.{more}"
-    )
+    caption = explanation("joints-friction", joint=title(joint), more=more)
     alt = f"Friction over velocity of {name_in_sentence(joint)}: {friction_in_words(shown[0])}"
     panels = tuple(friction_panel(m) for m in shown)
     yield Figure(caption, alt, panels, f"friction-{joint}", columns=2 if len(shown) > 1 else 1, height=48)

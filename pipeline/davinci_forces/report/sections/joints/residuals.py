@@ -9,7 +9,7 @@ from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Figure, Panel, Prose
 from davinci_forces.report.content.marks import HBand, Line, Points
 from davinci_forces.report.context import Context, fit_name, label
-from davinci_forces.report.sections.parts import autocorrelation, effort_panel, normal_plot, run_name
+from davinci_forces.report.sections.parts import autocorrelation, effort_panel, explanation, normal_plot, run_name
 from davinci_forces.report.verdicts import percent
 
 LAGS = 50  # lags of the cross-correlation on either side
@@ -43,14 +43,9 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    caption = (
-        f"{name}: the residual against position and velocity (points: means in 40 bins with standard errors; line: "
-        "mean of each direction), its autocorrelation, and its cross-correlation with the motion (grey: 95 % band of "
-        "white noise)."
-    )
     alt = f"{name}: {in_words(residual, errors, q)}"
     drawn = (*against, *own_correlations(context, residual, errors, q))
-    yield Figure(caption, alt, drawn, f"residual-figure-{place}", columns=2, height=34)
+    yield Figure(explanation("joints-residual", run=name), alt, drawn, f"residual-figure-{place}", columns=2, height=34)
     yield Prose(in_words(residual, errors, q))
 
 
