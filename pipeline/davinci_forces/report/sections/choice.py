@@ -83,10 +83,6 @@ def figure(choice: Choice) -> Figure:
     )
     finite = np.isfinite(choice.over_periods)
     repeated = (Points(size[finite], choice.over_periods[finite], "periods left out", "green"),) if finite.any() else ()
-    caption = (
-        "Relative residual, noise included, of every candidate over its number of parameters: on fitted data, and on "
-        "data that were left out."
-    )
     alt = "Relative residual over number of parameters: falling on fitted data, but not always on data left out."
     panels = (Panel("Candidates", "parameters", "relative residual", (*marks, *repeated)),)
-    return Figure(caption, alt, panels, label="choice-figure", height=46)
+    return Figure(explanation("choice-figure"), alt, panels, label="choice-figure", height=46)

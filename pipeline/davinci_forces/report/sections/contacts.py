@@ -24,20 +24,7 @@ def section(context: Context) -> Iterator[Block]:
         yield Prose(explanation("contacts", levels=alarm_levels(context)))
         yield peaks(context, contacts)
         yield from by_time(context, contacts)
-        states_some = any(contact.stated.any() for contact in contacts)
-        outside = " outside the windows that the study states" if states_some else ", as the study states no window"
-        caption = explanation("contact-table", most=PRINTED, outside=outside)
-        header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Middle half", "Impulse", "Verdict")
-        earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
-        of_contacts: list[tuple[Cell, ...]] = []
-        names = ("onset", "release", "peak", "middle_mean", "impulse")
-        for contact in contacts:
-            for i in range(len(contact)):
-                numbers = context.numbers(f"contact.{contact.log}.{contact.joint}.{i + 1}", names)
-                number = str(earlier[contact.joint] + i + 1)
-                of_contacts.append((*run_cells(contact), number, *numbers, verdict(contact, i)))
-            earlier[contact.joint] += len(contact)
-        yield Table(caption, header, of_contacts, "contact-table", "llrrrrrrl", largest(contacts))
+        yield contact_table(context, contacts)
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(explanation("contacts-unknown", logs=", ".join(unknown)))
@@ -45,6 +32,24 @@ def section(context: Context) -> Iterator[Block]:
     if unused:
         columns = ("Log", "Joint", "Reason, and remedy")
         yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
+
+
+def contact_table(context: Context, contacts: list[Contact]) -> Table:
+    """Every window, log by log."""
+    states_some = any(contact.stated.any() for contact in contacts)
+    outside = " outside the windows that the study states" if states_some else ", as the study states no window"
+    caption = explanation("contact-table", most=PRINTED, outside=outside)
+    header = ("Log", "Joint", "No.", "Onset", "Release", "Peak", "Middle half", "Impulse", "Verdict")
+    earlier: Counter[str] = Counter()  # windows of each joint in the logs before, as the figure numbers them
+    rows: list[tuple[Cell, ...]] = []
+    names = ("onset", "release", "peak", "middle_mean", "impulse")
+    for contact in contacts:
+        for i in range(len(contact)):
+            numbers = context.numbers(f"contact.{contact.log}.{contact.joint}.{i + 1}", names)
+            number = str(earlier[contact.joint] + i + 1)
+            rows.append((*run_cells(contact), number, *numbers, verdict(contact, i)))
+        earlier[contact.joint] += len(contact)
+    return Table(caption, header, rows, "contact-table", "llrrrrrrl", largest(contacts))
 
 
 def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
@@ -67,12 +72,8 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
             peaks = (context.number(keys[joint]) if joint in keys else "–" for joint in joints)
             rows.append((literal(log), f"{first:.1f} to {last:.1f} s", *peaks))
     if rows:
-        caption = (
-            "Contacts of several joints by their time: the peak on each joint that exceeds its detection level, where "
-            "windows overlap in one row."
-        )
         header = ("Log", "Time", *map(title, joints))
-        yield Table(caption, header, tuple(rows), "contacts-by-time", "ll" + "r" * len(joints))
+        yield Table(explanation("contacts-by-time"), header, tuple(rows), "contacts-by-time", "ll" + "r" * len(joints))
 
 
 def alarm_levels(context: Context) -> str:

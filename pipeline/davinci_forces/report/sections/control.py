@@ -6,7 +6,7 @@ from davinci_forces.records import Control, Lyapunov
 from davinci_forces.report.content import Block, Figure, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.marks import HLine, Line
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import section_of
+from davinci_forces.report.sections.parts import explanation, section_of
 from davinci_forces.robots.robot import ControlStudy
 
 SHARE_DRAWN = 0.5  # of a study's time, in which it settles
@@ -19,13 +19,10 @@ def section(context: Context, runs: list[Control]) -> Iterator[Block]:
     studies = [study for study in context.study.robot.control if study.name in names]
     exact = [study for study in studies if study.known_masses == 1.0]
     light, thesis = [study for study in studies if study.known_masses != 1.0], context.compares_with_thesis
-    yield Prose(
-        "These are simulations of the full rigid-body model of the arm, under controllers with gravity compensation"
-        + (", as in the thesis's chapter 5 (gains of Tables 5.1 and 5.4)" if thesis else "")
-        + f". Friction{', which the thesis does not state,' * thesis} is viscous only, "
-        f"{viscous_friction(context, studies[0])}. With exact gravity compensation PD settles at its reference, and "
-        "the Lyapunov function $V = 1/2 dot(q)^T M dot(q) + 1/2 tilde(q)^T K_p tilde(q)$ never rises."
-    )
+    gains = ", as in the thesis's chapter 5 (gains of Tables 5.1 and 5.4)" * thesis
+    unstated = ", which the thesis does not state," * thesis
+    friction = viscous_friction(context, studies[0])
+    yield Prose(explanation("control", gains=gains, unstated=unstated, friction=friction))
     for study in exact:
         rise, start = (context.results.get(f"control.{study.name}.{name}") for name in ("V_rise", "V_0"))
         if rise and start:
@@ -37,11 +34,8 @@ def section(context: Context, runs: list[Control]) -> Iterator[Block]:
         columns = {"Settling time": "settling_time", "Overshoot": "overshoot", "Error at the end": "error_end"}
         yield table(context, exact, f"{caption}end.", columns)
     if light:
-        yield Prose(
-            "If the compensator does not know all of the masses, PD settles with an offset. Integral action removes "
-            "this offset slowly: its slow pole keeps the error **larger** than PD's offset for some twenty seconds."
-            + (" The thesis calls the response faster, which this simulation does not confirm." if thesis else "")
-        )
+        faster = " The thesis calls the response faster, which this simulation does not confirm." * thesis
+        yield Prose(explanation("control-masses", faster=faster))
         share, end = light[0].known_masses, f"{light[0].duration:g} s"
         caption = f"Position error when gravity is compensated with {share:g} of the masses, after 10, 20 and {end}."
         columns = {"After 10 s": "error_10", "After 20 s": "error_20", f"After {end}": "error_end"}

@@ -24,13 +24,9 @@ def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
         key = f"excitation.{e.joint}.{e.source}"
         scores = *context.numbers(key, ("objective", "condition"), 5), context.number(f"{key}.excess_q", 2)
         rows.append((title(e.joint), source_label(e), *scores, *context.numbers(key, names, 4)))
-    caption = (
-        "Published trajectories and those designed here: objective, condition number, excess over the position limits, "
-        "and coefficients of the Fourier series."
-    )
     symbols = (f"${name[0]}_{name[1]}$" for name in names)
     header = ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits", *symbols)
-    yield Table(caption, header, tuple(rows), "excitation-table", "llrrrrrrrr")
+    yield Table(explanation("excitation-table"), header, tuple(rows), "excitation-table", "llrrrrrrrr")
     for e in excitations:
         for symbol, meaning in MOTION.items():
             if getattr(e, f"excess_{symbol}") > 0:

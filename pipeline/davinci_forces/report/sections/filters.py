@@ -33,12 +33,8 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     """The tuned noise of each joint, and the logs of the tuning."""
     names = ("r_q", "r_dq", "r_tau", "q_tau")
     rows = [(title(n.joint), *context.numbers(f"tuning.{n.joint}", names), literal(", ".join(n.logs))) for n in noises]
-    caption = (
-        "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
-        "per square root of a second."
-    )
     header = ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on")
-    return Table(caption, header, rows, "filter-tuning", "lrrrrl")
+    return Table(explanation("filter-tuning"), header, rows, "filter-tuning", "lrrrrl")
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
@@ -100,9 +96,6 @@ def noise_over_delay(noises: list[FilterNoise]) -> Figure:
     for n in noises:
         marks = Line(n.trial_delay, n.trial_std), Points(n.trial_delay, n.trial_std)
         panels.append(Panel(title(n.joint), "delay [s]", label(n, "trial_std", "noise"), marks, x_log=True))
-    caption = (
-        "Noise over delay: the standard deviation of the filter's external effort at rest, if a push may be shown that "
-        f"late. This study has a delay of {noises[0].delay:g} s; `delay` in the settings of study.toml changes it."
-    )
+    caption = explanation("noise-over-delay", delay=noises[0].delay)
     alt = f"Noise of the filter over its delay for {count(len(noises), 'joint')}."
     return Figure(caption, alt, tuple(panels), "noise-over-delay", height=35)

@@ -180,12 +180,8 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
         numbers = context.numbers(f"tip.{contact.log}.{i + 1}", F)
         worst = f"{max(errors_in_deviations(contact, i, push)):.1f}"
         rows.append((literal(contact.log), str(i + 1), *true, *numbers, worst))
-    caption = (
-        "The largest force at the tip in each contact [N], true and estimated, and the error of the worst component in "
-        "standard deviations. The true force is the peak of the push; the estimate can peak at another instant."
-    )
     header = ("Log", "Contact", *(f"true ${f}$" for f in F), *(f"${f}$" for f in F), "Error")
-    return Table(caption, header, rows, "tip-truth", "llrrrrrrr")
+    return Table(explanation("tip-truth"), header, rows, "tip-truth", "llrrrrrrr")
 
 
 def truth_verdict(name: str, errors: list[float]) -> Verdict:

@@ -59,11 +59,8 @@ def traces(context: Context, run: HapticRun) -> Figure:
         Line(t, run.true_force[few], "true", "black", "solid"),
         Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
     )
-    caption = (
-        f"Simulated, hand “{hand_name(context, run.hand)}” in and out of the tissue, contact shaded. Positions from "
-        "the surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the "
-        f"felt force. RMS error of the felt force: {context.number(f'haptics.{run.hand}.felt_error', 2)}.{ends}"
-    )
+    hand, error = hand_name(context, run.hand), context.number(f"haptics.{run.hand}.felt_error", 2)
+    caption = explanation("haptic-run", hand=hand, error=error, ends=ends)
     alt = (
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N."
@@ -82,10 +79,6 @@ def response_figure(response: HapticResponse) -> Figure:
         line, at = Line(response.frequency, y, "", "blue", "solid"), VLine(response.at_frequency)
         return Panel(name, "frequency [Hz]", unit, (line, at, *marks), x_log=True)
 
-    caption = (
-        "Simulated: the felt stiffness over the true one, and the delay of the felt force, over the frequency of the "
-        "hand's motion in the tissue."
-    )
     alt = (
         f"Two curves over frequency: the felt share of the stiffness, {response.felt_share.min():.2f} to "
         f"{response.felt_share.max():.2f}, and its delay, at most {MS * response.felt_late.max():.0f} ms."
@@ -94,4 +87,4 @@ def response_figure(response: HapticResponse) -> Figure:
         panel("Felt stiffness over true", "share", response.felt_share, HLine(1.0)),
         panel("Delay of the felt force", "delay [ms]", MS * response.felt_late),
     )
-    return Figure(caption, alt, panels, "haptic-response", columns=2, height=42)
+    return Figure(explanation("haptic-response"), alt, panels, "haptic-response", columns=2, height=42)

@@ -78,10 +78,7 @@ def trials(e: Explanation) -> Table:
     for i in order:
         p, explains = f"{least[i]:.2g}" if least[i] >= 0.001 else "< 0.001", "●" if e.explains[i] else ""
         rows.append((literal(str(e.without[i])), str(e.left[i]), f"{e.walk[i]:.3g}", p, explains))
-    caption = (
-        f"{parts.run_name(e)}: the removed cause, the number of tested samples, the random walk over "
-        "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run."
-    )
+    caption = parts.explanation("innovation-trials", run=parts.run_name(e))
     header = ("Without", "Samples", "Random walk", "Smallest $p$", "Explains")
     return Table(caption, header, tuple(rows), f"trials-{e.log}-{e.joint}", "lrrrl")
 

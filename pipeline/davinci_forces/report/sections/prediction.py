@@ -48,11 +48,7 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
         (*parts.run_cells(p), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names)) for p in predictions
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative residual")
-    caption = (
-        "Scores of the raw effort. Relative residual: the root mean square of measured minus predicted effort over "
-        "that of the effort, both low-passed, noise included."
-    )
-    return Table(caption, header, rows, "scores-table", "lllrrrrrr")
+    return Table(parts.explanation("scores-table"), header, rows, "scores-table", "lllrrrrrr")
 
 
 def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:

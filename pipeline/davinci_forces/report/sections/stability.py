@@ -43,13 +43,9 @@ def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     yield from (verdict(context, limit, tissues) for limit in limits if tissues)
     yield Prose(model(context, limits))
     yield limits_table(context, limits)
-    caption = (
-        "Limits of the tissue's stiffness. Left, without delay: the stiffness up to which a Lyapunov function exists "
-        "(line), and up to which the worst switching is stable (dashed). Right: the whole loop over an added delay."
-    )
     alt = "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force."
     panels = (map_panel(context, tissues), delay_panel(context, limits, tissues))
-    yield Figure(caption, alt, panels, "stability-limits", columns=2, height=62)
+    yield Figure(explanation("stability-limits"), alt, panels, "stability-limits", columns=2, height=62)
     yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 

@@ -137,11 +137,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
     )
-    caption = (
-        f"{literal(force.log)}: the path of the tip, and the largest force of each contact, numbered in the order "
-        f"of [@tip-contacts]; 1 N is drawn {Number(1e3 * per_newton, 'mm', digits=2)} long. The black line at "
-        "its end is the 95 % interval along the least certain direction."
-    )
+    caption = explanation("tip-space", log=literal(force.log), scale=Number(1e3 * per_newton, "mm", digits=2))
     alt = f"The path of the tip in space in {literal(force.log)}, with the largest force of each contact as an arrow."
     return Figure3D(caption, alt, marks, f"tip-space-{force.log}", height=88)
 

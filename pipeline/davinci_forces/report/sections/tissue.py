@@ -70,11 +70,7 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force from", "Stiffness", "Quartile 1", "Quartile 3", "Used", "In contact")
-    caption = (
-        "Stiffness of the tissue, its quartiles over pushes, the number of used pushes, and the number of pushes with "
-        "contact among all examined pushes."
-    )
-    return Table(caption, header, tuple(rows), "tissue-table", "llrrrrr")
+    return Table(explanation("tissue-table"), header, tuple(rows), "tissue-table", "llrrrrr")
 
 
 def nearest(tissue: Stiffness) -> int:
