@@ -100,8 +100,8 @@ class Export:
             lines.append(f"  {motor.name}: 1 A of its motor counts as {counts}")
         lines += self.remarks()
         for fit in fits:
-            rows = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True)
             lines.append(f"parameters of {'.'.join(fit.key)}, with standard errors:")
+            rows = parameters_of(fit)
             lines += [f"  {name}: {value:.6g} +- {std:.2g} {unit}".rstrip() for name, value, std, unit in rows]
         return [visible(line) for line in lines]
 
@@ -115,24 +115,22 @@ class Export:
                 text = f"{joint.name}: as samples arrive, {covers}, not 95 %"
                 yield f"warning: {text}; judge its external effort by the alarm level"
 
-    def remarks(self) -> list[str]:
-        """Name narrow bands, springs that are negative beyond their error, and parameters that physics has positive."""
+    def negative_parameters(self) -> Iterator[str]:
+        """Name springs that are negative beyond their error, and parameters that physics has positive."""
         advice = (
             "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have: "
             "fit = 'independent.consistent' in [settings]"
         )
-        return [
-            *self.narrow_bands(),
-            *(
-                f"warning: {'.'.join(fit.key)}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
-                for fit, model in self.fits.values()
-                for about, name, value, std, unit in zip(
-                    terms_of(model), fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, strict=True
-                )
-                if about.term and (about.term.positive or about.term == stiffness)
-                if value < (-NORMAL_95 * std if about.term == stiffness else -SOLVER_ZERO)
-            ),
-        ]
+        for key, (fit, model) in self.fits.items():
+            for about, (name, value, std, unit) in zip(terms_of(model), parameters_of(fit), strict=True):
+                is_spring = about.term == stiffness
+                is_positive = is_spring or (about.term is not None and about.term.positive)
+                if is_positive and value < (-NORMAL_95 * std if is_spring else -SOLVER_ZERO):
+                    yield f"warning: {key}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
+
+    def remarks(self) -> list[str]:
+        """Name what the user has to know of bands and parameters."""
+        return [*self.narrow_bands(), *self.negative_parameters()]
 
     def document(self) -> dict[str, Any]:
         """The model as JSON values."""
@@ -166,6 +164,12 @@ def terms_of(model: Model) -> list[ModelTerm]:
     return [*(names[column] for column in model.base.columns.tolist()), *frictions]
 
 
+def parameters_of(fit: Fit) -> list[tuple[str, float, float, str]]:
+    """Name, value, standard error and unit of each parameter."""
+    names, units = map(str, fit.parameter), map(str, fit.unit)
+    return list(zip(names, fit.theta.tolist(), fit.theta_std.tolist(), units, strict=True))
+
+
 def _chain(chain: Chain) -> dict[str, Any]:
     columns = (chain.links, chain.parent.tolist(), chain.coordinate.tolist(), chain.slides.tolist())
     rows = zip(*columns, chain.placement.tolist(), strict=True)
@@ -178,12 +182,10 @@ def _chain(chain: Chain) -> dict[str, Any]:
 
 
 def _model(fit: Fit, model: Model) -> dict[str, Any]:
-    stds = map(json_number, fit.theta_std.tolist())
-    rows = zip(fit.parameter, fit.theta.tolist(), stds, fit.unit, strict=True)
     parameters = [
-        {"name": str(name), "joint": about.joint or None, "value": value, "std": std, "unit": str(unit)}
+        {"name": name, "joint": about.joint or None, "value": value, "std": json_number(std), "unit": unit}
         | (_term(about.term) if about.term else {"role": "link", "link": about.link, "inertial": about.inertial})
-        for about, (name, value, std, unit) in zip(terms_of(model), rows, strict=True)
+        for about, (name, value, std, unit) in zip(terms_of(model), parameters_of(fit), strict=True)
     ]
     about = {"structure": fit.structure, "efforts": list(model.efforts), "logs": list(fit.logs), "mse": fit.mse}
     return {**about, "parameters": parameters}
@@ -201,9 +203,9 @@ def _term(term: Term) -> dict[str, Any]:
 def _joint(joint: ExportedJoint, verdict: str | None) -> dict[str, Any]:
     i, units = joint.model.efforts.index(joint.name), {name: joint.joint.unit(unit) for name, unit in UNITS.items()}
     motion = {"cutoff": joint.fit.cutoff[i], "effort_lag": joint.fit.effort_lag[i]}
-    bounds = {name: getattr(joint.joint.limits, symbol) for name, symbol in (("position", "q"), ("velocity", "dq"))}
-    limits = {name: [*map(json_number, ends)] for name, ends in bounds.items()}
-    limits["effort"] = [json_number(sign * joint.joint.limits.effort) for sign in (-1.0, 1.0)]
+    bounds = joint.joint.limits
+    ends = {"position": bounds.q, "velocity": bounds.dq, "effort": (-bounds.effort, bounds.effort)}
+    limits = {name: [*map(json_number, pair)] for name, pair in ends.items()}
     return {
         "name": joint.name, "kind": joint.joint.kind.value, "verdict": verdict, "model": ".".join(joint.fit.key),
         "units": units, "motion": motion, "limits": limits, "validity": joint.validity, "filter": joint.filter,

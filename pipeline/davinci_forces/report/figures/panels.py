@@ -4,7 +4,6 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 
@@ -213,5 +212,4 @@ def wrap_label(label: str, room: float) -> str:
 
 
 def _wrap(text: str, room: float) -> str:
-    options: Any = {"break_long_words": False, "break_on_hyphens": False}
-    return textwrap.fill(text, max(int(room / LETTER_WIDTH), 1), **options)
+    return textwrap.fill(text, max(int(room / LETTER_WIDTH), 1), break_long_words=False, break_on_hyphens=False)

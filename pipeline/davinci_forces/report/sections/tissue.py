@@ -168,17 +168,13 @@ def surface_map(tissue: Stiffness) -> Figure:
 def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]:
     """Every push of the logs with few pushes."""
     header = ("Push", "Stiffness", "R2", "First contact", "On the way in", "On the way out", "Energy lost", "Share")
-    caption = (
-        "Stiffness with the $R^2$ of its line, depth of first contact, stiffness on the way in and out, and the energy "
-        "that the tissue absorbs, also as a share of the work of loading."
-    )
     names = ("k_t", "r2", "onset_depth", "k_t_loading", "k_t_unloading", "lost", "lost_share")
     for tissue in tissues:
         prefix = f"tissue.{tissue.log}"
         rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
         if len(rows) <= MAX_PUSHES_LISTED:
-            heading = f"{literal(tissue.log)}: every push. {caption}"
-            yield Table(heading, header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
+            caption = explanation("pushes", log=literal(tissue.log))
+            yield Table(caption, header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
 
 def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Table]:

@@ -176,10 +176,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
         scores = context.numbers(key, ("mse", "r2", "condition"))
         rows.append((fit_name(fit.model, fit.estimator), *scores, *values))
     group = fits[0].group
-    caption = (
-        f"Every fit of {name_in_sentence(group)}: mean squared error of the averaged effort, share of its "
-        "variance explained, condition number of the regressor, and the parameters."
-    )
+    caption = explanation("joints-fits", joint=name_in_sentence(group))
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
     diagnostics = context.catalogue.select(Diagnostic, stage="fit", subject=group)
