@@ -27,7 +27,8 @@ THESIS_TISSUE = 457.24  # [N/m], section 8.2
 def chapters(name: str) -> dict[str, str]:
     """The chapters of a file of text beside this module, by heading; the lines of a paragraph are as in the file."""
     text = text_of(read_bytes(Path(__file__).with_name(name)))
-    return {heading: body.strip() for heading, body in re.findall(r"^# ([\w-]+)\n(.*?)(?=^# |\Z)", text, re.M | re.S)}
+    _, *parts = re.split(r"^# ([\w-]+)\n", text, flags=re.M)  # headings, each before its body
+    return dict(zip(parts[::2], map(str.strip, parts[1::2]), strict=True))
 
 
 def explanation(chapter: str, **values: object) -> str:
