@@ -13,7 +13,7 @@ from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.signals.windows import spans
 from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedMotion, SimulatedRun, simulate_log, theta
-from davinci_forces.simulation.scenario import Scenario, SimulatedLog, SimulatedPush
+from davinci_forces.simulation.scenario import Scenario, SimulatedLog
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 from davinci_forces.toml import in_toml
 
@@ -24,7 +24,6 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
     """Simulate every log, and move the study into place when it is complete; `say` reports each log.
 
     Without `force`, logs and truth.toml are put beside the scenario's study.toml, and no other file changes.
-
     Raises BadRequest if `check` refuses the folder, or it holds another study.toml or a file with the name of a log.
     """
     check(folder, force)
@@ -106,33 +105,28 @@ def study_text(scenario: Scenario) -> str:
 
 def study_entry(scenario: Scenario, log: SimulatedLog) -> str:
     """The [[log]] of one recording in study.toml."""
-    path, t = Path(log.file), np.zeros(2)
+    t = np.zeros(2)
     at_rest = SimulatedRun(t, {name: SimulatedMotion(t, t, t, t) for name in log.joints}, np.zeros((2, 3)))
-    lines = ["[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(log.file)}", f"role = {in_toml(log.role)}"]
     periods = {move.period for move in log.moves.values() if isinstance(move, Fourier)}
-    if len(periods) == 1 and log.role in ("identification", "validation"):
-        lines.append(f"period = {in_toml(periods.pop())}")
-    if log.skip:
-        lines.append(f"skip = {in_toml(log.skip)}")
-    if log.windows:
-        lines.append(f"contact = {in_toml([list(window) for window in log.windows])}")
-    if log.role == "weight":
-        lines.append(f"weight = {{ mass = {in_toml(log.mass)} }}")
-    lines.append("[log.channels]")
+    period = periods.pop() if len(periods) == 1 and log.role in ("identification", "validation") else None
+    weight = {"mass": log.mass} if log.role == "weight" else None
+    optional = {"period": period, "skip": log.skip, "contact": log.windows, "weight": weight}
+    keys = {"name": log.name, "file": log.file, "role": log.role} | {k: x for k, x in optional.items() if x}
+    channels: dict[str, object] = {}
     for channel in record_channels(scenario, log, at_rest):
-        name = in_toml(sensors.channel_name(path, channel))
+        name = sensors.channel_name(Path(log.file), channel)
         if channel.quantity == "time":
-            lines.append(f"time = {name}")
+            channels["time"] = name
         else:
-            lines.append(f"{in_toml(channel.quantity)} = {{ channel = {name}, unit = {in_toml(channel.unit)} }}")
-    return "\n".join(lines) + "\n"
+            channels[in_toml(channel.quantity)] = {"channel": name, "unit": channel.unit}
+    return "\n".join(["[[log]]", *_pairs(keys), "[log.channels]", *_pairs(channels)]) + "\n"
 
 
 def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
     """The text of truth.toml: what was put into each joint, for each family if there are any; then the logs."""
-    lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
-    lines += [f"scenario = {in_toml(scenario.name)}", f"seed = {scenario.seed}"]
-    lines += [f"clock_jitter = {scenario.clock_jitter}"] * (scenario.clock_jitter > 0.0)
+    head = {"simulated": True, "scenario": scenario.name, "seed": scenario.seed}
+    head |= {"clock_jitter": scenario.clock_jitter} if scenario.clock_jitter > 0.0 else {}
+    lines = ["# What is true of the simulated recordings of this study.", *_pairs(head)]
     if scenario.arm is None:
         lines += _theta("theta", scenario, {name: np.array(j.theta) for name, j in scenario.joints.items()})
         for name, simulated in scenario.joints.items():
@@ -151,18 +145,16 @@ def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
 
 def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
     """The [[log]] of one recording in truth.toml: its pushes, its mass, and its times of contact."""
-    lines = ["[[log]]", f"name = {in_toml(log.name)}", f"role = {in_toml(log.role)}"]
-    lines += [f"{key} = {in_toml(value)}" for key, value in (("family", log.family), ("mass", log.mass)) if value]
-    if log.sensor:
-        lines.append(f"sensor = {{ noise = {in_toml(log.sensor.noise)}, lag = {in_toml(log.sensor.lag)} }}")
+    optional = {"family": log.family, "mass": log.mass, "sensor": log.sensor and vars(log.sensor)}
+    keys = {"name": log.name, "role": log.role} | {key: value for key, value in optional.items() if value}
     if log.tissue:
-        lines += [f"stiffness = {in_toml(log.tissue.stiffness)}", f"surface = {in_toml(log.tissue.surface)}"]
-        lines.append(f"touched = {in_toml(contact_times(run))}")
-    for joint, pushes in log.external.items():
-        for push in pushes:
-            lines += ["", "[[log.push]]", f"joint = {in_toml(joint)}", *_push(push)]
-    for push in log.tip:
-        lines += ["", "[[log.push]]", f"direction = {in_toml(push.direction)}", *_push(push)]
+        keys |= {"stiffness": log.tissue.stiffness, "surface": log.tissue.surface, "touched": contact_times(run)}
+    lines = ["[[log]]", *_pairs(keys)]
+    joint_pushes = [(joint, push) for joint, pushes in log.external.items() for push in pushes]
+    for joint, push in [*joint_pushes, *(("", push) for push in log.tip)]:
+        target = {"joint": joint} if joint else {"direction": push.direction}
+        shape = {key: getattr(push, key) for key in ("shape", "start", "end", "peak")}
+        lines += ["", "[[log.push]]", *_pairs({**target, **shape})]
     return "\n".join(lines) + "\n"
 
 
@@ -174,15 +166,16 @@ def contact_times(run: SimulatedRun) -> list[list[float]]:
 def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.float64]]) -> list[str]:
     lines = []
     for name, values in parameters.items():
-        terms = scenario.robot.joint(name).terms
-        lines += ["", f"[{place}.{name}]"]
-        lines += [f"{in_toml(t.name)} = {in_toml(p)}" for t, p in zip(terms, values.tolist(), strict=True)]
+        terms = (in_toml(term.name) for term in scenario.robot.joint(name).terms)
+        lines += _table(f"{place}.{name}", dict(zip(terms, values.tolist(), strict=True)))
     return lines
 
 
 def _table(place: str, values: Mapping[str, object]) -> list[str]:
-    return ["", f"[{place}]", *(f"{key} = {in_toml(value)}" for key, value in values.items())]
+    return ["", f"[{place}]", *_pairs(values)]
 
 
-def _push(push: SimulatedPush) -> list[str]:
-    return [f"{key} = {in_toml(getattr(push, key))}" for key in ("shape", "start", "end", "peak")]
+def _pairs(values: Mapping[str, object]) -> list[str]:
+    """Keys, bare or quoted, with their values; a table is written in its line."""
+    tables = {key: f"{{ {', '.join(_pairs(value))} }}" for key, value in values.items() if isinstance(value, Mapping)}
+    return [f"{key} = {tables[key] if key in tables else in_toml(value)}" for key, value in values.items()]
