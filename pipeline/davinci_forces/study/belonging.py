@@ -230,7 +230,7 @@ def group_recordings(files: Sequence[Path]) -> list[list[Path]]:
 def symbol_of(stem: str) -> str:
     """The symbol of the signal in a file's name, or ""; commanded signals have none."""
     words = re.findall(r"[a-z]+", split_signal(Path(stem))[1].lower())
-    if not words or set(COMMAND_WORDS) & set(words):
+    if not words or COMMAND_WORDS & set(words):
         return ""
     return next((symbol for symbol, names in SIGNAL_WORDS.items() if words[0] in names), "")
 

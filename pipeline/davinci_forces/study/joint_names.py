@@ -42,7 +42,7 @@ def _naming_joints(channels: Sequence[Channel], robot: Robot) -> Iterator[tuple[
     named = [{*_words(channel)} for channel in signals]
     of_the_kit = all(any(label & words for words in named) for label in (names.INSERTION_WORDS, {"yaw"}))
     of_the_kit |= any({"outer", "yaw"} <= words for words in named)
-    for channel in sorted(signals, key=lambda channel: bool({*names.ROUGH_WORDS} & {*_words(channel)})):
+    for channel in sorted(signals, key=lambda channel: bool(names.ROUGH_WORDS & {*_words(channel)})):
         words = _words(channel)
         if of_the_kit:
             joints = [k for k, joint in enumerate(robot.joints) if joint.name == names.psm_joint(words)]
@@ -91,7 +91,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
     units = {channel.name: names.stated_unit(channel) for channel in channels}
     meanings: dict[str, Meaning] = {}
     for symbol, group in groups.items():
-        usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if set(names.IN_DEGREES) & set(group.words) else ""
+        usual = {"q": "deg", "dq": "deg/s"}.get(symbol, "") if names.IN_DEGREES & {*group.words} else ""
         for label, name in group.names.items():
             if label.isdecimal() and len(numbers) == len(labels):
                 joint, reason = int(label) - first, BY_NUMBER
@@ -117,7 +117,7 @@ def by_words(channels: Sequence[Channel]) -> Holding:
     labels = [*named.get("q", ())]
     alike = any(set(named.get(effort, ())) == set(labels) for effort in ("tau", "i"))
     in_labels = {word for label in labels for word in label.split("_")}
-    if len(labels) < 2 or not alike or in_labels & {*names.PROCESSED_WORDS}:
+    if len(labels) < 2 or not alike or in_labels & names.PROCESSED_WORDS:
         return Holding()
     meanings = {
         name: Meaning(symbol, labels.index(label), f"joint {label!r}")

@@ -1,46 +1,21 @@
-"""Read what a channel measures from its name: its symbol, its joint and its unit, as recorders and laboratories write.
-
-Known are CRTK and dVRK (`measured_js`), RTDE of Universal Robots (`actual_q_0`), Franka (`tau_J`), KUKA
-(`measuredJointPosition`), Kinova (`actuators[0].torque`), `rostopic echo -p` (`field.position0`), PlotJuggler
-(`/joint_states/panda_joint1/position`) and what people type (`q1`, `Joint1_Pos`, `ang`, `q_raw`).
-"""
+"""Read what a channel measures from its name: its symbol, its joint and its unit; `words.toml` has the words."""
 
 import re
+import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from davinci_forces.files import read_bytes
 from davinci_forces.logs.log import Channel
 from davinci_forces.maths.units import OUTSIDE, canonical, measures
 
-# Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
-SIGNAL_WORDS = {
-    "i": ("current", "currents", "amp", "i", "cur", "curr", "strom", "imotor", "imot"),
-    "dq": (
-        "velocity", "velocities", "speed", "speeds", "rate", "dq", "qd", "qdot", "vel", "velo", "omega", "dtheta",
-        "dot", "geschwindigkeit", "winkelgeschwindigkeit", "drehzahl", "hastighed",
-    ),
-    "tau": ("torque", "torques", "effort", "efforts", "tau", "eff", "trq", "moment", "moments", "drehmoment"),
-    "q": (
-        "position", "positions", "angle", "angles", "pos", "q", "theta", "ang", "enc", "encoder", "winkel", "vinkel",
-        "weg",
-    ),
-}  # fmt: skip
-FORCE_WORDS = {"force", "f", "kraft"}  # of the effort of a joint, where the name names one
-COMMAND_WORDS = (
-    "desired", "target", "setpoint", "command", "commanded", "reference", "goal", "ref", "des", "cmd", "sp", "demand",
-    "demanded", "nominal", "soll", "asp", "asi", "servo",
-)  # fmt: skip
-# Words of quantities that are not measured at a joint: at the tip, of models, of the electronics.
-OTHER_WORDS = {
-    "tcp", "pose", "cartesian", "cp", "cv", "cf", "wrench", "tip", "tool", "ee", "ext", "external", "residual",
-    "gravity", "friction", "model", "estimated", "predicted", "temperature", "temperatures", "voltage", "error", "err",
-    "acceleration", "ddot", "dtau", "jaw", "gripper",
-}  # fmt: skip
-ROUGH_WORDS = ("raw", "unfiltered", "set")  # a signal of such a name is taken where there is no other
-PROCESSED_WORDS = (*ROUGH_WORDS, "filtered", "filt", "smooth", "smoothed", "measured", "actual", "act")  # of no joint
-TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
-TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "epoch", "unix", "field", "x"}
-IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
+WORDS = tomllib.loads(read_bytes(Path(__file__).with_name("words.toml")).decode())
+SIGNAL_WORDS: dict[str, list[str]] = WORDS["signal"]
+FORCE_WORDS, COMMAND_WORDS, OTHER_WORDS, ROUGH_WORDS, TIME_WORDS, TIME_QUALIFIERS, IN_DEGREES = (
+    frozenset[str](WORDS[name]) for name in ("force", "command", "other", "rough", "time", "time_qualifier", "degrees")
+)
+PROCESSED_WORDS = ROUGH_WORDS.union(WORDS["processed"])
 PARTS = re.compile(f"([/.]){OUTSIDE}")  # not the slash of `speed (rad/s)`
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 # Joints of the da Vinci Research Kit by its own labels, of which those of the slide are usual for any da Vinci arm.
@@ -89,7 +64,7 @@ def symbol_of(words: Sequence[str]) -> str:
     """The symbol of a measured quantity of a joint; "" for commands, quantities of the tip, and anything else."""
     if "".join(words).startswith("macur"):  # of KUKA's RSI, in per cent
         return ""
-    if set(words) & {*COMMAND_WORDS, *OTHER_WORDS} or ("d" in words and set(words) & {"q", "dq", "tau"}):
+    if set(words) & (COMMAND_WORDS | OTHER_WORDS) or ("d" in words and set(words) & {"q", "dq", "tau"}):
         return ""
     return next((symbol for symbol, telling in SIGNAL_WORDS.items() if set(telling) & set(words)), "")
 
@@ -109,14 +84,14 @@ def joint_groups(channels: Sequence[Channel]) -> list[Numbered]:
     words = {key: _words(key) for key in chosen}
     signals = [Numbered(symbol_of(words[key]), names, tuple(words[key])) for key, names in chosen.items()]
     known = [group for group in signals if group.symbol]
-    return sorted(known, key=lambda group: bool(set(ROUGH_WORDS) & {*group.words}))
+    return sorted(known, key=lambda group: bool(ROUGH_WORDS & {*group.words}))
 
 
 def _words(key: str) -> list[str]:
     """The words of a name without the joint: those of its last part with a symbol, and commands of any part."""
     parts = [words_of(part) for part in PARTS.split(key)]
     last = next((words for words in reversed(parts) if symbol_of(words)), [])
-    marking = {*COMMAND_WORDS, *OTHER_WORDS, *IN_DEGREES}
+    marking = COMMAND_WORDS | OTHER_WORDS | IN_DEGREES
     return last + [word for words in parts for word in words if word in marking]
 
 

@@ -8,30 +8,10 @@ from typing import NamedTuple
 from unicodedata import normalize
 
 from davinci_forces.maths.contact.unexplained import MIN_UNEXPLAINED, Course, has_outliers, unexplained_share
+from davinci_forces.study import names
 from davinci_forces.study.holding import Holding
 
-# Words by role, of several languages and in ASCII; `\b` stands at the edges of the words of a name, in which capitals,
-# `_` and digits separate, too.
-WORDS = {
-    "empty": r"(no|without|zero) ?(weight|pay ?load|load|mass)|(weight|payload|load|mass) (none|off|zero)"
-    r"|unloaded|empty|tare|0 ?k?g|ohne ?(gewicht|masse|nutz ?last|last)|unbelastet|leer|a (vide|vuoto)"
-    r"|(sans|senza|sin|sem|zonder|uden) ?(masse|charge|poids|peso|carico|carga|gewicht|vaegt)",
-    "free": r"(no|without) ?(contact|touch)|free|in air|frei|kontakt ?(frei|los)|(ohne|uden) ?(kontakt|beruehrung)"
-    r"|(sans|zonder) ?contact|(sin|sem|senza) ?(contacto|contato|contatto)|libre|libero|livre|vrij",
-    "weight": r"weights?|payloads?|load|loaded|unknown|\d+ ?k?g|gewicht\w*|nutz ?last|mit ?last|belastet|poids|peso"
-    r"|carico|carga|vaegt",
-    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing|gewebe|silicone?|gelatine?|foam|sponge|rubber"
-    r"|tissu|tessuto|tejido|tecido|weefsel|vaev|schwamm",
-    "contact": r"contacts?|touch\w*|push\w*|pull\w*|pok\w*|press\w*|collisions?|collid\w*|hits?|with ?force|kontakt\w*"
-    r"|stoss\w*|stoesse|kollision\w*|beruehrung\w*|contacto|contato|contatto",
-    "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)|\w*reibung|frottement|attrito|friccion"
-    r"|rozamiento|wrijving|friktion",
-    "validation": r"(kreuz|kruis|kryds)?valid\w*|val|cross ?val|hold ?out|verif\w*"
-    r"|(other|another|different) (path|motion|traj\w*)",
-    "identification": r"ident\w*|sys ?id|[ck]alib\w*|train\w*",
-    "excitation": r"excit\w*|exc|anregung\w*|eccitazione",
-    "test": r"test|check|\w*pruefung\w*|essai|prova|prueba",
-}
+ROLE_WORDS = {kind: re.compile(rf"\b({'|'.join(words)})\b") for kind, words in names.WORDS["role"].items()}
 ASCII = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "Ä": "AE", "Ö": "OE", "Ü": "UE"})
 MASS = re.compile(r"(\d+(?:[.p]\d+)?) ?(k?g)\b")
 GUESSED = "CHECK: guessed from its values"
@@ -88,7 +68,7 @@ def _word(path: str) -> tuple[str, str]:
     for name in reversed(path.split("/")):
         part = normalize("NFKD", normalize("NFC", name).translate(ASCII)).encode("ascii", "ignore").decode()
         text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:[.p]\d+)?", part)).lower()
-        kinds = [(kind, match[0]) for kind, words in WORDS.items() if (match := re.search(rf"\b({words})\b", text))]
+        kinds = [(kind, match[0]) for kind, words in ROLE_WORDS.items() if (match := words.search(text))]
         if kinds:
             if kinds[0][0] in ("weight", "empty") and (mass := MASS.search(text)) and float(mass[1].replace("p", ".")):
                 return "weight", mass[0]  # `weight150g`: the mass says more than the word
