@@ -5,7 +5,7 @@ here; parameters that it fitted to its recordings are compared with those of a s
 """
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from functools import cache
 from importlib.resources import files
@@ -19,7 +19,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.maths.models.terms import Term, gravity_cos, gravity_sin, inertia
+from davinci_forces.maths.models.terms import gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
 from davinci_forces.robots import davinci
 from davinci_forces.robots.robot import Joint
@@ -146,17 +146,22 @@ def bodies() -> dict[str, Array]:
     return {"l_c2 to l_c9 [m]": centres, **sizes}
 
 
-def factors(joint: Joint, rows: Sequence[tuple[str, Term, str]]) -> dict[str, Array]:
-    """The factors of monomials, such as m3 or m3 lc3, in the parameters of a joint, from the chain; by title."""
+def factors(joint: Joint, item: str) -> dict[str, Array]:
+    """The factors of monomials, such as m3 or m3 lc3, in the parameters of a joint, from the chain, as printed names.
+
+    A name tells the monomials and the term, which is the inertia unless it says the sine or the cosine.
+    """
     assert joint.physical is not None
     assert joint.dependence is not None
     place, coefficients = [x.name.removesuffix("L") for x in joint.physical.parameters], joint.dependence.coefficients
     columns = [sorted(i for i in row if i < len(place)) for row in joint.dependence.factors.tolist()]
-    return {
-        title.format(monomials): coefficients[joint.terms.index(term), [
-            columns.index(sorted(map(place.index, monomial.split()))) for monomial in monomials.split(", ")
-        ]] for title, term, monomials in rows
-    }  # fmt: skip
+    values = {}
+    for name in read()["numbers"][item]:
+        monomials, _, where = name.partition("of ")[2].partition(" in the ")
+        term = joint.terms.index({"sine": gravity_sin, "cosine": gravity_cos}.get(where, inertia))
+        factors = [sorted(map(place.index, monomial.split())) for monomial in monomials.split(", ")]
+        values[name] = coefficients[term, [*map(columns.index, factors)]]
+    return values
 
 
 def trajectory(joint: Joint, source: str) -> Fourier:
@@ -230,17 +235,6 @@ def measurement_noise() -> dict[str, Array]:
     return {"deviation of position [rad] and velocity [rad/s]": np.array([noise.q, noise.dq])}
 
 
-# The coefficients of (6.7) and (6.10).
-ROLL_FACTORS = (
-    ("factors of {} in the inertia", inertia, "m3, m4, m5, m3 lc3, m5 lc5"),
-    ("of {} in the sine", gravity_sin, "m3, m4, m5, m3 lc3, m5 lc5"),
-)
-PITCH_FACTORS = (
-    ("factors of {} in the inertia", inertia, "m3, m5, m3 lc3, m5 lc5"),
-    ("of {}", inertia, "m6 lc6, m7 lc7, m8 lc8, m9 lc9"),
-    ("of {} in the sine", gravity_sin, "m3, m4, m5, m6, m8"),
-    ("of {} in the cosine", gravity_cos, "m3, m4, m5, m6, m8"),
-)
 # Numbers that need no computation: gains, poses, the size of a swarm and when it ends, and the hanging mass with the
 # scale from the printed force.
 GAINS = {"K_p": np.array(davinci.K_P), "K_i": np.array(davinci.K_I), "K_d": np.array(davinci.K_D)}
@@ -259,8 +253,8 @@ FOUND: dict[str, Callable[[], dict[str, Array]]] = {
     "Table 5.2": lambda: POSES,
     "Table 5.3": lambda: POSES,
     "Table 5.4": lambda: GAINS,
-    "Eq 6.7-6.9": lambda: factors(ROLL, ROLL_FACTORS),
-    "Eq 6.10-6.12": lambda: factors(PITCH, PITCH_FACTORS),
+    "Eq 6.7-6.9": lambda: factors(ROLL, "Eq 6.7-6.9"),
+    "Eq 6.10-6.12": lambda: factors(PITCH, "Eq 6.10-6.12"),
     "Table 6.1": excitation,
     "Table 6.2": limits,
     "Eq 6.28-6.29, Table 6.3": motors,
