@@ -13,8 +13,7 @@ from davinci_forces.runner.console import echo, table
 def run(
     files: Annotated[list[Path], Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
     robot: Annotated[
-        str,
-        Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
+        str, Option(help="davinci, dvrk_psm, or a .toml or .urdf file in the study's folder.", show_default="guessed")
     ] = "",
     study: Annotated[Path | None, Option(help="Folder of the study, instead of the first log's.")] = None,
     show: Annotated[bool, Option("--print", help="Print the text instead of writing study.toml.")] = False,

@@ -22,12 +22,7 @@ PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 COMMENT = re.compile(r"#.*")
 PLAIN = (str, float, int, bool, type(None))
-REASONS = {  # part of a fingerprint -> reason to run
-    "given": "the {} changed",
-    "schemas": "the declaration of {} changed",
-    "code": "the code of {} changed",
-    "inputs": "{} changed",
-}
+CHANGED = {"given": "the ", "schemas": "the declaration of ", "code": "the code of ", "inputs": ""}  # why to run
 
 
 def hash_of_text(text: str) -> str:
@@ -85,9 +80,9 @@ def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
         changed.append(f"version {then.get('version')} became {now.version}")
     old = then.get("settings", {})
     changed += [f"{k} = {old.get(k)!r} became {v!r}" for k, v in now.settings.items() if old.get(k) != v]
-    for what, reason in REASONS.items():
+    for what, words in CHANGED.items():
         old, new = then.get(what, {}), getattr(now, what)
-        changed += [reason.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)]
+        changed += [f"{words}{name} changed" for name in sorted(old | new) if old.get(name) != new.get(name)]
     return changed
 
 
@@ -118,10 +113,7 @@ def package_fingerprint() -> str:
 
 @cache
 def code(*modules: str, without: str = "") -> dict[str, str]:
-    """The hashes of modules and of everything of the pipeline that they import, directly or not.
-
-    Modules in the package `without` are left out, unless they are named.
-    """
+    """The hashes of modules and of all that they import, directly or not, except others in the package `without`."""
     named = {name for module in modules for name in _files(module)}
     files, waiting = set(named), list(named)
     while waiting:
@@ -139,10 +131,7 @@ def _imports(file: str) -> tuple[str, ...]:
 
 
 def find_imports(source: str) -> Iterator[tuple[str, list[str]]]:
-    """Find what a source imports from the pipeline: each module, and the names from it.
-
-    A regular expression finds the statements, since parsing all of a stage's modules would take longer than many runs.
-    """
+    """Find the modules, and the names from each, that a source imports: by a regular expression, as parsing is slow."""
     for module, text in IMPORT.findall(source):
         names = COMMENT.sub("", text).strip("() \n").split(",")
         yield module, [name.split()[0] for name in names if name.strip()]

@@ -154,9 +154,8 @@ class Study:
     @property
     def weighings(self) -> Weighings:
         """The weight logs."""
-        return Weighings(
-            tuple(Weighing(e.name, e.weight, e.tare) for e in self.logs if e.weight and e.role == "weight")
-        )
+        each = (Weighing(e.name, e.weight, e.tare) for e in self.logs if e.weight and e.role == "weight")
+        return Weighings(tuple(each))
 
     @property
     def files(self) -> int:

@@ -15,17 +15,14 @@ from davinci_forces.maths.units import SI, UNITS, canonical, measures, size, uni
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
-from davinci_forces.study.channels import ALTERNATIVES
+from davinci_forces.study.channels import ALTERNATIVES, AXES, FORCE
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
 MAX_VALUE = 1e30  # of a sample in the unit of its channel; no quantity of an arm is larger, nor are times in ns
 HISTORY = 1 << 13  # samples before a jump of the clock in which the motion may have repeated
 
 # Channels of the log by the columns of a Touch; channels of joints become recordings.
-TOUCH_COLUMNS = {
-    "depth": "depth", "force": "force", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z",
-    "x": "tip_x", "y": "tip_y", "z": "tip_z",
-}  # fmt: skip
+TOUCH_COLUMNS = {name: name for name in ("depth", "force", *FORCE)} | {axis: f"tip_{axis}" for axis in AXES}
 
 
 def touch_of(reading: "Intake", block: Block, t: Column, selected: Booleans) -> Touch | None:

@@ -21,12 +21,11 @@ def summary(intake: Intake) -> LogSummary:
         until = f" and those after {entry.until:g} s left out" if intake.ended else ""
         why = f"{clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
         raise log.bad(f"{why}; record more, or take the log out of study.toml")
-    feeds: dict[str, list[str]] = {}
+    feeds: dict[str, dict[str, None]] = {}  # channel -> its quantities, in order
     for quantity, channel in intake.channels.items():
-        feeds.setdefault(channel.name, []).append(quantity)
+        feeds.setdefault(channel.name, {})[quantity] = None
     for name in filter(None, (group.time for group in intake.clocks.groups)):
-        if "time" not in feeds.setdefault(name, []):
-            feeds[name].append("time")
+        feeds.setdefault(name, {})["time"] = None
     names = [channel.name for channel in log.channels]
     facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
