@@ -49,10 +49,7 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
 
 
 def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
-    """Times (K,) at which the effort is measured and predicted, and the low-passed difference (K,).
-
-    Standstill is left out, as friction can then take any value, and so are filled samples.
-    """
+    """Times (K,) at which a moving joint's effort is measured and predicted, and the low-passed difference (K,)."""
     predicted = np.isfinite(tau_hat)
     tau_ext = (model.tau - tau_hat)[predicted]
     if predicted.any():

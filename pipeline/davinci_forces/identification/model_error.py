@@ -1,12 +1,8 @@
 """The error of parameters that is due to the model: their change over blocks of path, and over other models.
 
-A model that errs alike in every period has parameters that hardly differ between periods, but are wrong.  They change
-if other parts of the path are fitted, or if the friction is modelled otherwise.  The other models have each friction
-that may be added, and an offset, which with Coulomb friction is friction by direction.  Those count that predict parts
-of the path left out as well as the best: they are worse by at most `MAX_WORSE` standard errors of the difference.  So
-does the best one without added friction: added friction may take effort from viscous and Coulomb friction and yet
-predict better.  No motion separates an offset from the weight of a vertical slide.  There it takes half of the constant
-effort.
+The guide tells why: `how-far-to-trust-it`.  The other models have each friction that may be added, and an offset, which
+with Coulomb friction is friction by direction.  It takes half of the constant effort of a vertical slide, whose weight
+no motion separates from it.
 
     s_model^2 = (s_blocks^2 - s_noise^2 + mean over models of ((theta_i - theta)^2 - s_i^2)) / 2 + s_ridge^2
 
@@ -39,16 +35,14 @@ def model_std(part: CandidatePart, theta: Array, noise_std: Array, candidates: I
     compared = models_to_compare(part, list(other_models(part, candidates, logs)))
     changes = np.array([squared_changes(part, theta, noise_std, model) for model in compared]).reshape(-1, len(theta))
     shared = np.maximum((~np.isnan(changes)).sum(axis=0), 1)
-    over_blocks = std_over_blocks(part, logs) ** 2 - noise_std**2
+    blocks = np.tile(np.arange(selection.PATH_BLOCKS), logs)
+    over_blocks = jackknife(part.by_block, part.ridge, blocks) ** 2 - noise_std**2
     by_model = (over_blocks + np.nansum(changes, axis=0) / shared) / 2.0
     return np.asarray(np.sqrt(np.maximum(by_model, 0.0) + squares_of_ridge(part, theta, noise_std)))
 
 
 def squares_of_ridge(part: CandidatePart, theta: Array, noise_std: Array) -> Array:
-    """Square the change of parameters (p,) without their ridge, or what noise would add without it if that is more.
-
-    Where no data separate columns, a ridge alone divides the effort between them.
-    """
+    """Square the change of parameters (p,) without their ridge, or what noise would add without it if that is more."""
     if part.ridge.strength <= WEAK_RIDGE:
         return np.zeros(len(theta))
     total, ridge = selection.sum_all(part.by_block), part.ridge
@@ -103,11 +97,6 @@ def unit_variance(part: CandidatePart) -> Array:
     return np.diag(selection.covariance(selection.sum_all(part.by_block), part.ridge, 1.0 / part.ridge.weights))
 
 
-def std_over_blocks(part: CandidatePart, logs: int) -> Array:
-    """Jackknife the standard errors (p,) of a model's parameters over blocks of path."""
-    return jackknife(part.by_block, part.ridge, np.tile(np.arange(selection.PATH_BLOCKS), logs))
-
-
 def std_over_periods(part: CandidatePart, logs: int) -> Array:
     """Jackknife the standard errors (p,) of a model's parameters over periods, and blocks of path of logs without any.
 
@@ -137,10 +126,7 @@ def jackknife(cells: Equations, ridge: Ridge, number: Integers) -> Array:
 def other_models(
     part: CandidatePart, candidates: Iterable[Candidate], logs: int
 ) -> Iterator[tuple[CandidatePart, bool, CrossValidation]]:
-    """Cross-validate the candidates' models of the same joints, each also with an offset; some cannot be refitted.
-
-    The flag tells a model without added friction.
-    """
+    """Cross-validate models of the same joints, each also with an offset; the flag tells one without added friction."""
     parts = [(p, not c.added) for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
     same = [(p, is_plain) for p, is_plain in parts if p.model.efforts == part.model.efforts]
     together = [part.library.joints_moving.get(log, 0) for log in range(logs)]

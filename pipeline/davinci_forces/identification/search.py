@@ -1,9 +1,6 @@
 """The search for the model of each joint: its terms, the processing of its motion and effort, and its ridge.
 
-A step changes the processing, adds the term that most reduces the error on parts of the path left out, or changes the
-term's scale.  It has to reduce the error of at least two thirds of the blocks of path.  The search ends where there is
-no such term.  Of all steps, the first one is chosen that is not clearly worse than the best: by at most one standard
-error of the difference.  The errors of all steps are those of the scores, whatever a step's low-pass.
+The report describes the steps in `choice`.  Their errors are those of the scores, whatever the low-pass of a step.
 """
 
 from collections.abc import Iterator, Sequence
@@ -92,10 +89,7 @@ class JointSearch:
     def step(
         self, name: str, processing: Processing, terms: tuple[Term, ...], near: float, among: tuple[Term, ...] = ()
     ) -> Step | None:
-        """Cross-validate a model with the best of the ridges `near` one; None if it cannot be refitted.
-
-        `among` are the terms of a larger model, whose equations are used.
-        """
+        """Cross-validate a model with the best ridge `near` one, by equations of terms `among`; None if singular."""
         key = processing, terms
         if key not in self._steps:
             equations = self.library(processing, among or terms)

@@ -1,8 +1,4 @@
-"""Out-of-sample predictions of identification logs, by the joints' own fits and by candidates.
-
-Own fits leave out the log or, with a single log, a period or a segment.  So do refits of candidates, for comparison; a
-candidate is chosen by another scheme, which leaves blocks of path out.
-"""
+"""Out-of-sample predictions of identification logs, by the joints' own fits and, for comparison, by candidates."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """The record of what each result was made from: one small JSON file per task.
 
-A task is up to date while its fingerprint and the content of its outputs agree with its entry.  The fingerprint covers
-inputs by content, settings, robot, declarations of records, code and version.  Comparing an old entry with a new
-fingerprint gives the reason to run.
+A task is up to date while its fingerprint and the content of its outputs agree with its entry.
 
 A study may come from somebody else, and files that an entry names may be removed.  So an entry is valid only in its own
 place, and only if it names files of the report and records of present or former kinds.
