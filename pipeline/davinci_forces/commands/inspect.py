@@ -60,10 +60,7 @@ class _Survey:
 
 
 def describe(file: Path, head: int, options: "Options") -> dict[str, Any]:
-    """Read a whole log, clock by clock, and describe it as JSON values, without NaN.
-
-    Raises BadLog if it cannot be read.
-    """
+    """Read a whole log, clock by clock, and describe it as JSON values, without NaN; raises BadLog if it is damaged."""
     from davinci_forces.logs import open_log
     from davinci_forces.study.timing import named_time
 

@@ -35,10 +35,7 @@ def run(
         Option("--thesis", help="Print what reproduces each table, figure and equation of the thesis (davinci only)."),
     ] = False,
 ) -> None:
-    """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.
-
-    For a robot without known geometry, print its joints only.
-    """
+    """Print the pose, the Jacobian of the tip (7.21)-(7.24) and the terms of (4.38); without a chain, only joints."""
     from davinci_forces.robots import load
     from davinci_forces.toml import numbers_of_option
 
@@ -76,10 +73,7 @@ def _index(robot: "Robot") -> str:
 
 
 def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
-    """The printed quantities as JSON values.
-
-    Raises BadRequest if the robot has no chain, or the length of q or dq is wrong.
-    """
+    """The printed quantities as JSON values; raises BadRequest for a q or dq that the robot's chain does not have."""
     import numpy as np
 
     from davinci_forces.maths.mechanics import kinematics, tip_force

@@ -13,10 +13,7 @@ def run(
     out: Annotated[Path, Argument(help="Folder of the new study.")],
     force: Annotated[bool, Option("--force", help="Replace an existing simulated study.")] = False,
 ) -> None:
-    """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml.
-
-    If OUT holds the study.toml of this scenario, logs and truth.toml are written beside it, and no other file changes.
-    """
+    """Write study.toml, logs and truth.toml of a scenario; beside its own study.toml, only the logs and truth.toml."""
     from davinci_forces.simulation import study_folder
     from davinci_forces.simulation.scenario.reading import load
 

@@ -41,10 +41,7 @@ def run(
 
 
 def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | None) -> "Hand":
-    """The hand with these parameters, in SI units.
-
-    Raises BadRequest if a parameter is impossible; all such parameters are named.
-    """
+    """The hand with these parameters, in SI units; raises BadRequest that names all impossible parameters."""
     from davinci_forces.haptics.maths.bimodal import Hand
     from davinci_forces.toml import unlikely
 

@@ -159,10 +159,7 @@ def candidates(
     robot: Robot, separate: dict[str, tuple[Observed, ...]], arm: tuple[Observed, ...], reaches: dict[str, Reach],
     count: int,
 ) -> list[Candidate]:  # fmt: skip
-    """Return all candidate models of `count` logs.
-
-    `separate` are the logs of each joint alone, `arm` the logs of all joints together.
-    """
+    """Return all candidate models of `count` logs: `separate` are of each joint alone, `arm` of all joints together."""
     added = {name: every_term(reach) for name, reach in reaches.items()}
     every = {name: with_every_term(robot.joint(name), reach) for name, reach in reaches.items()}
     independents = [library(every[name], logs, count) for name, logs in separate.items()]

@@ -213,7 +213,6 @@ def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
 
     The standard errors remain those of the candidate, as `consistent` keeps those of least squares.  A joint by itself
     has at least the inertia that causes `MIN_INERTIA_SHARE` of its effort, because a filter divides by it.
-
     Raises NotIdentifiable if the conic program is not solved.
     """
     equations, samples = sum_all(part.by_block), part.library.cells.samples

@@ -20,10 +20,7 @@ MAX_OMITTED = 0.1  # share of the largest harmonic; where a larger one is left o
 
 
 def describe_correlated(names: Sequence[str], conditioning: least_squares.ColumnAnalysis) -> list[str]:
-    """Describe correlated parameters: pairs by their correlation, and larger combinations by their uncertainty.
-
-    A combination of the two parameters of a reported pair is not reported again.
-    """
+    """Describe correlated pairs of parameters, and the uncertain combinations that are not of such a pair."""
     correlated = least_squares.correlated_pairs(conditioning, MIN_CORRELATION)
     texts = [f"the estimates of {join_names([names[i], names[j]])} are correlated: {r:.2f}" for i, j, r in correlated]
     reported = [{i, j} for i, j, _ in correlated]

@@ -135,10 +135,7 @@ class Identified:
 
 
 class LogModels:
-    """The models of fits along one log; results that the joints of an arm share are computed once.
-
-    A model gets the motion through the low-pass of its fit, and delayed by the lag of the effort.
-    """
+    """The models of fits along one log, with the low-pass and lag of each; what joints share is computed once."""
 
     _motion_at = staticmethod(motion_at)
 

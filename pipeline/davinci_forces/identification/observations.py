@@ -158,10 +158,7 @@ def averaged_samples(t: Array, average: Average | Trajectory) -> Booleans:
 def pose_samples(
     model: Model, log: Observed, which: Booleans | None = None, known: Prior = NO_PRIOR
 ) -> tuple[Regression, Integers]:
-    """Return the least squares problem of a joint of a log that does not repeat, and its samples (K,).
-
-    `which` (N,) selects samples; without it all are taken.  The weight of each sample is that of one period.
-    """
+    """Return the least squares problem of a joint of a log without periods, at `which` samples (N,), and these (K,)."""
     Phi, tau, samples = log.rows(model)
     if which is not None:
         Phi, tau, samples = Phi[which[samples]], tau[which[samples]], samples[which[samples]]

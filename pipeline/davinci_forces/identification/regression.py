@@ -28,15 +28,12 @@ def parameter_columns(model: Model) -> dict[str, NDArray[Any]]:
 
 
 def pose(model: IndependentJoint, t: Trajectory, known: Prior = NO_PRIOR) -> Regression:
-    """Return the least squares problem of a joint over the averaged period of a log.  (6.37)
-
-    Samples at standstill have weight 0, because friction is undetermined at standstill.
-    """
+    """Return the least squares problem of a joint over the averaged period of a log.  (6.37)"""
     return Regression(
         Phi=model.regressor(averaged_motion(t)).Phi[:, 0],
         tau=t.tau,
         tau_var=t.tau_var,
-        periods=np.where(stands_still(t), 0, t.count),
+        periods=np.where(stands_still(t), 0, t.count),  # at standstill, friction is undetermined
         starts=(0,),
         names=tuple(parameter.name for parameter in model.parameters),
         known=known,

@@ -56,10 +56,7 @@ class Places:
                     yield kind, path, log, joint
 
     def find(self, kinds: Kinds, log: str = ANY, joint: str = ANY, role: str = ANY) -> tuple[Located, ...]:
-        """Files of these kinds about a log, a joint and logs of a role.
-
-        A record of a kind without a log applies to every log, and one without a joint to every joint.
-        """
+        """Files of these kinds about a log, a joint and logs of a role; a kind without log or joint is about all."""
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
             of_joint = joint if {"joint", "group"} & {*kind.KEY} else ANY

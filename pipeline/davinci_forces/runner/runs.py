@@ -79,10 +79,7 @@ def single_study(name: Path) -> Path:
 
 
 def results_of(name: Path, reports: Path | None = None) -> Path:
-    """The results.json of this name, or the results.json of the report folder or study of this name.
-
-    Raises BadRequest if a folder holds neither a study nor results; MissingRecord if a study has no results yet.
-    """
+    """The results.json of a name, report folder or study; raises MissingRecord if a study has none, or BadRequest."""
     if name.exists() and not name.is_dir():
         return name
     folder = single_study(name)

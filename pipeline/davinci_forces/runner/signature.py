@@ -99,10 +99,7 @@ def declaration(step: str) -> Declaration:
 
 
 def _signature(step: str) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """The settings that a step takes, and the types of its parameters and of what it returns.
-
-    They are read from the text of its module, too, of which only the signature is parsed.
-    """
+    """The settings that a step takes, and the types of its parameters and result, from the text of its signature."""
     stage, _, name = step.partition(".")
     signature = re.search(rf"^def {name or 'run'}\(.*?:$", _source(stage), re.MULTILINE | re.DOTALL)
     [function] = ast.parse(f"{signature and signature[0]} ...").body

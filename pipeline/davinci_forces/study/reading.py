@@ -33,10 +33,7 @@ OUTDATED_SETTINGS = ("derivative",)  # settings without effect that earlier vers
 
 
 def read(folder: Path) -> Study:
-    """Read and validate `folder/study.toml`; `Study.absent` lists logs that do not exist.
-
-    Raises BadStudy with every problem of the file and of the robot's file, one a line, and then every absent log.
-    """
+    """Read and validate `folder/study.toml`; raises BadStudy with all problems, one a line, then every absent log."""
     missing = "there is no such file; `davinci-forces new` writes one from a log"
     return study_of(toml.read(folder / "study.toml", BadStudy, missing), folder)
 

@@ -82,16 +82,11 @@ def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> Ve
     moves = columns.moving_positions([q for q, _ in pairs]) if pairs and len(pairs[0][0]) else ()
     both = [columns.derivative(*pairs[i], t) for i in moves]
     alike = [VelocityRatio(*pair) for pair in both if pair[0] >= MIN_CORRELATION]
-    if not alike:
-        return None
-    return VelocityRatio(*np.median(alike, axis=0).tolist())
+    return VelocityRatio(*np.median(alike, axis=0).tolist()) if alike else None
 
 
 def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> TimeGuess:
-    """Guess the times of a log from the first samples of its channels, and from position and velocity of its joints.
-
-    `unnamed`: names tell nothing, so that the first channel that rises may be the time.
-    """
+    """Guess the times of a log by its samples, their velocities and, if `unnamed`, by the first channel that rises."""
     per_sample = slope_of(pairs)
     if has_clock(log):
         return _timing_of_format(log, samples, per_sample)

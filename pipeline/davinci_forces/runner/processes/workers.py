@@ -80,10 +80,7 @@ class WorkerPool:
 
 @dataclass
 class TaskQueue:
-    """Runs tasks in this process or in other processes, and yields each outcome when its task is done.
-
-    Other processes are prepared once enough work is expected, and started once there is work for them.
-    """
+    """Runs tasks here, or in other processes once there is work enough for them; yields each outcome as it comes."""
 
     others: WorkerPool | None = None
     restarts: int = 0  # of the others
@@ -190,10 +187,7 @@ class TaskQueue:
                     yield outcome
 
     def _replace(self) -> None:
-        """Replace the pool after one of its processes was killed.
-
-        It is not known which task was lost: all tasks of the pool fail together.
-        """
+        """Replace the pool, whose tasks all fail together if one process is killed: nobody knows which one was lost."""
         self.restarts += 1
         if self.restarts > MAX_RESTARTS:
             raise BrokenExecutor

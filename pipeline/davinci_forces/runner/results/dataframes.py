@@ -50,10 +50,7 @@ def results(study: Path) -> pd.DataFrame:
 
 
 def numbers_of(places: Folders) -> dict[str, Mapping[str, Any]]:
-    """The numbers of results.json by key, each with the `FIELDS`, and with the reason for an error that is missing.
-
-    Raises MissingRecord if there is no results.json, or if it is damaged.
-    """
+    """The numbers of results.json by key, with `FIELDS` and `std_reason`; raises MissingRecord without intact ones."""
     file = places.reports / "results.json"
     try:
         rows = json.loads(read_bytes(file))

@@ -17,10 +17,7 @@ from davinci_forces.study.review import STUDY
 
 
 def permitted_export(folders: Folders, joints: list[str], despite_verdict: bool) -> Export:
-    """Return the export of joints, if neither a verdict of page one nor a reviewer forbids it, or despite that.
-
-    Raises BadRequest if one forbids it, or a joint has no model.
-    """
+    """Return the export of joints; raises BadRequest if a verdict or a reviewer forbids it, or a joint has no model."""
     study, ledger = reading.read(folders.raw), Ledger(folders)
     catalogue = reporting.catalogue(ledger, Plan(study, ledger).places().find(tuple(KINDS.values())))
     verdicts = {j["joint"]: j["verdict"] for j in campaign.read_summary(folders.reports / "summary.json")["joints"]}

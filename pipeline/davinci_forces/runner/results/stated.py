@@ -11,10 +11,7 @@ from davinci_forces.report.changes import StatedValue, Value
 
 
 def read(file: Path) -> dict[str, StatedValue]:
-    """Read all numbers of a results.json by key, in the order of the file.
-
-    Raises BadRequest if the file cannot be read or is not a results.json; names the first wrong number.
-    """
+    """Read the numbers of a results.json by key, in its order; raises BadRequest that names the first wrong number."""
     try:
         rows = json.loads(read_bytes(file))
     except OSError as error:

@@ -68,7 +68,6 @@ def answer(request: Request, report_start: ReportStart | None = None) -> Answer:
 
     Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
     whole arm.  Otherwise the joints' models are independent, and each trajectory is optimal for its own joint.
-
     Raises BadRequest or BadRobot if the request is invalid or cannot be met.
     """
     file = Path(request.robot)  # a listed robot, or a .toml file

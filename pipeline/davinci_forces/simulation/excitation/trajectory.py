@@ -108,10 +108,7 @@ def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
-    """Plot position, velocity and acceleration of a period, with their limits.  Fig 6.5
-
-    Raises BadRequest if the file's name does not end in one of PLOTS.
-    """
+    """Plot the motion of a period with its limits; raises BadRequest if `path` ends in none of PLOTS.  Fig 6.5"""
     if path.suffix not in PLOTS:
         raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
     import matplotlib as mpl
@@ -146,9 +143,8 @@ def table(
     """Write the run-in from rest and one period at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
 
     The period starts at t = 0, and the run-in has negative times; if `from_rest` is False, there is no run-in.  The
-    run-in keeps the `limits` of the arm.
-
-    Raises BadRequest if the periods differ, a period is no whole number of samples, or no run-in keeps the limits.
+    run-in keeps the `limits` of the arm.  Raises BadRequest if the periods differ, a period is no whole number of
+    samples, or no run-in keeps the limits.
     """
     samples = _samples(excitations, rate)
     before = _run_in_samples(excitations, samples, rate, limits) if from_rest else 0
