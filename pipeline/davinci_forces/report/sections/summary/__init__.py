@@ -82,7 +82,8 @@ def rule_in_words(trusts: list[Trust]) -> str:
 
 def caption(context: Context, contacts: list[Contact], panels: list[Panel]) -> str:
     """The caption of the figure, which names the log if all panels are of one, as `in_column` then does not."""
-    level = "Grey: the level that 95 % of the samples in free space stay below, not an error band."
+    level = "Grey: the level that 95 % of the samples in free space stay below, not an error band. "
+    level += "The first second and the last half of one, in which filter and low-pass err, are not drawn."
     if not contacts:
         return f"External effort of each joint in its worst run that was not fitted. {level}"
     which = "Shown is the contact log with the largest model error, of those that touch only this joint if any do. "
