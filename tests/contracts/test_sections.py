@@ -1080,6 +1080,18 @@ def test_the_coverage_of_page_one_is_the_lowest_of_all_logs_that_were_not_fitted
     )
 
 
+def test_the_largest_static_friction_of_each_joint_at_rest_is_stated_once(full: Context):
+    [track, *_] = full.catalogue.records(Track)
+    still = [
+        replace(track, log=log, joint=joint, at_rest=1, static_friction=level)
+        for log, joint, level in (("a", "hand_roll", 0.3), ("b", "hand_roll", 0.5), ("a", "hand_pitch", 0.2))
+    ]
+    texts = [block.text for block in runs.track_blocks(full, still) if isinstance(block, Prose)]
+    [said] = [text for text in texts if "static level" in text]
+    levels = [full.size(t, "static_friction", t.static_friction) for t in still[1:]]
+    assert said.endswith(f"up to that level: {levels[0]} on the hand roll and {levels[1]} on the hand pitch.")
+
+
 def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):
     def still(track: Track) -> Track:
         k = np.arange(len(track))

@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 from davinci_forces.records import Diagnostic, Explanation, LogSummary, Signal, Track, first_of_each_kind
 from davinci_forces.records.forces import SMOOTHER, FilterNoise, FreeSpace
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal, message
 from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
-from davinci_forces.report.context import Context, count, label
+from davinci_forces.report.context import Context, count, label, name_in_sentence
 from davinci_forces.report.sections import parts
 from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
@@ -36,10 +37,14 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
         + (tested if context.catalogue.records(Explanation) else "")
     )
     if at_rest := [t for t in tracks if t.at_rest]:
-        levels = [f"{parts.run_name(t)}: {context.size(t, 'static_friction', t.static_friction)}" for t in at_rest]
+        largest = {t.joint: t for t in sorted(at_rest, key=lambda t: t.static_friction)}
+        levels = [
+            f"{context.size(largest[joint], 'static_friction', largest[joint].static_friction)} on "
+            f"{name_in_sentence(joint)}" for joint in context.joints_of(at_rest)
+        ]  # fmt: skip
         yield Prose(
             f"Joints at rest have no figures. At standstill friction takes any value up to its static level, and hides "
-            f"external efforts up to that level ({'; '.join(levels)})."
+            f"external efforts up to that level: {as_list(levels)}."
         )
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]
