@@ -217,6 +217,14 @@ def test_a_push_that_is_held_reads_its_level_in_the_middle_of_the_contact():
         assert abs(contact.peak[0] - 5.0) > 3 * contact.middle_mean_std[0]
 
 
+def test_no_touch_is_seen_in_the_last_half_second_of_a_log():
+    """There the low-pass of the motion errs; a second earlier the same effort is a touch."""
+    rush = noise() + np.where(np.arange(len(T)) >= len(T) - 20, 3.0, 0.0)
+    for tau_ext, is_told in ((rush, False), (np.roll(rush, -100), True)):
+        made = assess.run(track(tau_ext, role="validation", dq=np.ones(len(T))), entry(role="validation"), arm.ARM)
+        assert any(isinstance(said, Diagnostic) for said in made) == is_told
+
+
 def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),)), arm.ARM))
     assert not list(assess.run(track(noise()), entry(role="contact"), arm.ARM))

@@ -57,10 +57,10 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     from davinci_forces.haptics import loop as haptic
 
     response = haptic.response(scenario)
-    if not response.is_followed:
+    if not response.is_followed or not limits.is_followed_without_friction(scenario):
         raise BadRequest(
             f"{scenario.title}: the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so "
-            "it follows no hand; state another [arm.body], or another [arm.control]"
+            "it follows no hand; state other gains, [arm.control], another `tick` of the drivers, or another [arm.body]"
         )
     loop = limits.loop_response(scenario)
     hands = {}

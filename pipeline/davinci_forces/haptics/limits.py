@@ -44,6 +44,11 @@ def without_friction(scenario: FullScenario, body: Body | None = None) -> FullSc
     )  # fmt: skip
 
 
+def is_followed_without_friction(scenario: FullScenario) -> bool:
+    """Whether the linear arm follows a slow hand; a loose controller may follow by the help of friction alone."""
+    return is_followed(without_friction(scenario))
+
+
 def gain_and_impedance(scenario: FullScenario, frequency: float) -> tuple[complex, complex]:
     """G and Z [N/m] at a frequency [Hz], from simulations with and without the tissue."""
     gain = scenario.device.force * scenario.device.motion

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from davinci_forces.maths.arrays import Array, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.periods.harmonics import Harmonics, are_apart
 
 SMOOTH = 30  # harmonics of the fit that moves samples within the width of one phase bin
@@ -91,6 +91,15 @@ class Phases:
         noise -= mean[self.bins]
         var = np.bincount(self.bins, noise * noise, self.K) / np.maximum(self.counts - 1, 1)
         return Folded(mean + smooth, var, self.counts, noise)
+
+    def mean_of(self, x: Array, which: Booleans) -> Array:
+        """Average those of the samples (N,) that are `which` (N,) at each phase, (K,).
+
+        A phase without any gets the fit to all samples, of which those that do not count keep it from swinging.
+        """
+        smooth, noise = self.move_to_phases(x)
+        counts = np.bincount(self.bins[which], minlength=self.K)
+        return np.asarray(smooth + np.bincount(self.bins[which], noise[which], self.K) / np.maximum(counts, 1))
 
 
 def nearest(since: Array, period: float, K: int) -> Integers:

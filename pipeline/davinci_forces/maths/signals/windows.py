@@ -10,6 +10,7 @@ from davinci_forces.maths.signals.smoothing import segments
 UNSCORED_STRETCH, UNSCORED_SAMPLE = 1, 2  # flags of samples that are not scored: with their transients, or alone
 MIN_FREE_SAMPLES = 100  # from which errors in free space are computed
 TRANSIENT = 1.0  # [s] duration of a filter's transient, left out of the statistics of the whole run
+LAST_MOMENTS = 0.5  # [s] of a log in which the low-pass of the motion errs, as it has no later samples
 
 
 def is_outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:

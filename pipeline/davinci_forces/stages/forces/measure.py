@@ -8,7 +8,14 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact import detection
 from davinci_forces.maths.contact.detection import Event
 from davinci_forces.maths.signals.standstill import SLOW
-from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
+from davinci_forces.maths.signals.windows import (
+    LAST_MOMENTS,
+    TRANSIENT,
+    free_smoothed,
+    is_outside,
+    is_past_transient,
+    spans,
+)
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -17,7 +24,6 @@ from davinci_forces.study import LogEntry
 
 Window = tuple[float, float]
 WINDOW_MARGIN = 0.5  # [s] by which a contact may begin before its window, or end after it
-LAST_MOMENTS = 0.5  # [s] of a log in which the low-pass of the motion errs, as it has no later samples
 
 
 def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: Robot) -> Iterator[Contact | Diagnostic]:

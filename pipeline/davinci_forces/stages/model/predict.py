@@ -160,7 +160,8 @@ def apply(
 def residual_of(model: JointModel, average: Average | None, label: tuple[str, str]) -> Residual:
     """A model's effort and the measured one, averaged over periods, or low-passed like the model's motion.
 
-    `label` is the residual's model and estimator.
+    `label` is the residual's model and estimator.  A phase that is scored in no period, as where the joint rests in
+    each, has no residual: the measured effort is that of the model.
     """
     columns = [model.dq, model.tau, model.tau_hat]
     if average is None:
@@ -169,9 +170,10 @@ def residual_of(model: JointModel, average: Average | None, label: tuple[str, st
         t, (dq, tau, tau_hat) = model.t[samples], (x[samples] for x in smooth)
     else:
         last = average.t_start + (average.periods * average.period - 0.5 / model.rate)
-        used = (model.t >= average.t_start - 0.5 / model.rate) & (model.t <= last) & (model.unscored == 0)
-        phased = Phases(model.t[used], average.period, len(average))
-        t, (dq, tau, tau_hat) = average.t, (phased.fold(x[used]).mean for x in columns)
+        used = (model.t >= average.t_start - 0.5 / model.rate) & (model.t <= last)
+        phased, is_scored = Phases(model.t[used], average.period, len(average)), model.unscored[used] == 0
+        t, (dq, tau, tau_hat) = average.t, (phased.mean_of(x[used], is_scored) for x in columns)
+        tau = np.where(np.bincount(phased.bins[is_scored], minlength=len(t)) > 0, tau, tau_hat)
     return Residual(model.log, model.joint, *label, model.rate, t=t, dq=dq, tau=tau, tau_hat=tau_hat)
 
 

@@ -52,7 +52,7 @@ def run(
         tuned.delay if tuned else haptics.filter_delay,
     )
     answer = haptic.response(scenario)
-    if not answer.is_followed:
+    if not answer.is_followed or not limits.is_followed_without_friction(scenario):
         yield not_followed(scenario, arm_from)
         return
     loop = limits.loop_response(scenario)
@@ -66,7 +66,10 @@ def run(
 def not_followed(scenario: FullScenario, arm_from: str) -> Diagnostic:
     """Warn that the simulated arm is unstable by itself, as with an inertia that the logs hardly determine."""
     text = f"arm: its simulated controller does not stabilise {scenario.body.inertia:.2g} kg, the inertia of {arm_from}"
-    remedy = "record a faster motion if that is too small, or state [arm.body] in the file that `haptics` names"
+    remedy = (
+        "state the gains [arm.control] and the drivers' period `tick` of your arm in the file that `haptics` names; "
+    )
+    remedy += "if the inertia is wrong, record a faster motion, or state [arm.body]"
     message = f"{text}, so no limit of haptic feedback is computed; {remedy}"
     return diagnostic("haptic-limits", "arm.followed", "warning", message)
 
