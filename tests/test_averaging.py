@@ -103,6 +103,20 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
     assert_allclose(on.noise, x - on.mean[np.arange(samples) % 400], atol=1e-12)
 
 
+def test_a_phase_without_a_sample_that_counts_has_the_fit_to_all_and_the_others_their_mean():
+    """A joint rests during an eighth of each period; a fit to the rest of it alone would swing there."""
+    t = np.arange(2000) / 100 + 0.3
+    x = 2.0 + np.sin(2 * np.pi * t / 4.0) + 0.1 * np.random.default_rng(3).normal(size=len(t))
+    phases = averaging.Phases(t, 4.0, 400)
+    counted = phases.bins >= 50
+    counted[:120] = False  # of the first period only the end, so the first that counts is at no first phase
+    found = phases.mean_of(x, counted)
+    true = 2.0 + np.sin(2 * np.pi * (phases.t[0] + np.arange(400) / 100) / 4.0)
+    assert np.abs(found - true).max() < 0.3
+    expected = [x[counted & (phases.bins == k)].mean() for k in range(50, 400)]
+    assert_allclose(found[50:], expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("length", [2.0, 1.2345])
 def test_the_variance_at_a_phase_is_over_one_sample_less_than_it_has_whether_samples_fall_on_phases_or_not(length):
     t = np.arange(1400) / 100

@@ -11,8 +11,20 @@ from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import bias
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std, share_passed
-from davinci_forces.records import Choice, Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Residual, Signal
+from davinci_forces.records import (
+    Average,
+    Choice,
+    Diagnostic,
+    Fit,
+    JointModel,
+    Motion,
+    Prediction,
+    Recording,
+    Residual,
+    Signal,
+)
 from davinci_forces.stages.model import choose, fit, predict
+from davinci_forces.stages.recordings import average as averaging
 from davinci_forces.stages.recordings import resample
 from davinci_forces.study.entries import ROLES
 from tests import arm
@@ -112,6 +124,24 @@ def test_the_fit_that_the_study_names_is_scored_and_has_its_residual_although_it
     assert all(p.model != "other" for p in without if isinstance(p, Prediction))
     along = predict.apply([arm.motion(signal)], [], [], [*fits, named], entry(), arm.ARM, fit="other.huber")
     assert [(r.model, r.estimator) for r in along if isinstance(r, Residual)] == [("other", "huber")]
+
+
+def test_a_residual_is_bounded_and_0_where_the_joint_rests_in_every_period(identified):
+    """A rest of a tenth of the period; all of the first is unscored, too, as where a log starts from rest."""
+    signal, fits, predictions = identified
+    [model] = arm.models([signal], fits, predictions)
+    made = averaging.run([signal], entry(), arm.ARM, harmonics=0, lowpass=CUTOFF)
+    [average] = [record for record in made if isinstance(record, Average)]
+    phase = (model.t - average.t_start) % average.period / average.period
+    rests = (phase > 0.45) & (phase < 0.55)
+    model = replace(model, unscored=np.where(rests | (model.t < average.t_start + 0.5), 1, 0))
+    made = predict.residual_of(model, average, ("chosen", "lse"))
+    scored = predict.residual_of(replace(model, unscored=np.zeros(len(model), int)), average, ("chosen", "lse"))
+    errors, at = made.tau - made.tau_hat, made.t / average.period
+    assert np.abs(errors[(at > 0.46) & (at < 0.54)]).max() == 0.0
+    assert np.abs(made.tau).max() <= 1.2 * np.abs(model.tau).max()
+    elsewhere = (at < 0.44) | (at > 0.56)
+    assert np.corrcoef(made.tau[elsewhere], scored.tau[elsewhere])[0, 1] > 0.999
 
 
 def test_an_identification_log_is_predicted_by_refits_that_had_not_seen_the_sample(identified):
