@@ -131,9 +131,26 @@ def test_the_log_of_an_external_effort_is_saved_with_its_windows(identified, tmp
     with np.load(folder / log.files[0]) as saved:
         assert_allclose(saved[f"{JOINT}.tau"], PUSHED.tau)
         assert_allclose(saved["time"], PUSHED.t)
+    assert f"{JOINT}, {len(effort.t)} samples, {len(effort.contacts)} contacts" in repr(effort)
+    free = identified.external_effort(FIRST.t, FIRST.q, FIRST.tau, dq=FIRST.dq, free=[[0, 1000]])
+    assert reading.read(identified.save(tmp_path / "free", calm=free)).log("calm").role == "validation"
     with pytest.raises(BadRequest, match="identification-1 is the name of an identified log"):
         identified.save(tmp_path / "other", **{"identification-1": effort})
     assert not (tmp_path / "other").exists()
+
+
+def test_a_log_for_validation_is_not_fitted_and_gives_the_band(folder, tmp_path):
+    logs = {name: [getattr(log, name) for log in (FIRST, PUSHED)] for name in ("t", "q", "tau", "dq")}
+    t, q, tau, dq = logs.values()
+    given = {"joints": JOINT, "period": [2.0, None], "roles": ["identification", "validation"]}
+    made = davinci_forces.identify(str(folder / "arm.toml"), t, q, tau, dq=dq, **given)
+    assert {log for fit in made.record for log in fit.logs} == {"identification-1"}
+    assert set(made._bands[JOINT].source) == {"validation-1"}
+    roles = [(log.name, log.role) for log in reading.read(made.save(tmp_path / "two")).logs]
+    assert roles == [("identification-1", "identification"), ("validation-1", "validation")]
+    for wrong in (["validation"] * 2, ["identification", "contact"], ["identification"]):
+        with pytest.raises(BadRequest, match="roles"):
+            davinci_forces.identify("davinci", t, q, tau, **given | {"roles": wrong})
 
 
 def test_settings_are_saved_and_a_robot_of_no_file_is_not(identified, folder, tmp_path):

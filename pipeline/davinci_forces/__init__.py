@@ -26,6 +26,7 @@ def identify(
     dq: Any = None,
     joints: "str | Sequence[str] | None" = None,
     settings: "Mapping[str, Any] | None" = None,
+    roles: "Sequence[str] | None" = None,
 ) -> "IdentifiedArm":
     """Identify the models of a robot's joints from arrays of free motion, as the stages do from a study's logs.
 
@@ -33,7 +34,8 @@ def identify(
     (n,) or (n, joints) in SI, arrays or pandas objects.  Lists of arrays are several logs.  `joints` names the columns;
     without it, the names of a DataFrame do, or the columns are all joints of the robot.  `period` [s] is that of the
     excitation, one for all logs or one a log; without it, it is detected.  `settings` are those of a study.  `tau` are
-    efforts at the joints [N m or N]: multiply a motor current by gear ratio and torque constant first.
+    efforts at the joints [N m or N]: multiply a motor current by gear ratio and torque constant first.  `roles` has
+    "identification" or "validation" for each log: bands and levels are then those of logs that no fit used.
 
     >>> arm = davinci_forces.identify("davinci", t, q, tau, joints="hand_roll")
     >>> arm.parameters["parameter"].tolist()[:2]
@@ -56,7 +58,7 @@ def identify(
     arithmetic.pin()
     from davinci_forces import arrays
 
-    return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings)
+    return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings, roles=roles)
 
 
 def read(study: str | Path, record: str, **about: object) -> "pd.DataFrame":

@@ -5,7 +5,7 @@ import tempfile
 import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from davinci_forces.toml import TomlFile, TomlTable, in_toml
 
 IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
 NEW = "new"  # the log that is predicted, or whose external effort is estimated
-FITTED = "identification"
+FITTED, VALIDATION = "identification", "validation"
 MIN_SAMPLES = 50  # of a log
 
 Samples = Any  # an array, Series or DataFrame, or a list of those, one a log
@@ -45,6 +45,7 @@ def identify(
     robot: str | Path | Robot, t: Samples, q: Samples, tau: Samples, *,
     period: float | Sequence[float] | None = None, dq: Samples = None,
     joints: str | Sequence[str] | None = None, settings: Mapping[str, Any] | None = None,
+    roles: Sequence[str] | None = None,
 ) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
     table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
@@ -55,11 +56,16 @@ def identify(
     given = {name: x if several else [x] for name, x in (("q", q), ("tau", tau), ("dq", dq)) if x is not None}
     times = list(t) if several else [t]
     periods = [period] * len(times) if period is None or isinstance(period, int | float) else list(period)
-    for name, x in [*given.items(), ("period", periods)]:
+    used_as = [FITTED] * len(times) if roles is None else list(roles)
+    if not {FITTED} <= {*used_as} <= {FITTED, VALIDATION}:
+        each = f"give {FITTED} or {VALIDATION} for each log"
+        raise BadRequest(f"roles is {used_as}: {each}, and {FITTED} for at least one")
+    for name, x in [*given.items(), ("period", periods), ("roles", used_as)]:
         if len(x) != len(times):
             raise BadRequest(f"t has {len(times)} logs, but {name} has {len(x)}; give a list of as many for each")
     moved = joints_of(arm, given["q"][0], [joints] if isinstance(joints, str) else joints)
-    return IdentifiedArm(arm, used, moved, columns_of(times, given, moved), periods, (robot, dict(settings or {})))
+    logs = columns_of(times, given, moved)
+    return IdentifiedArm(arm, used, moved, logs, periods, used_as, (robot, dict(settings or {})))
 
 
 def refuse(table: TomlTable) -> None:
@@ -125,7 +131,7 @@ class IdentifiedArm:
 
     def __init__(
         self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
-        periods: Sequence[float | None], arguments: tuple[str | Path | Robot, dict[str, Any]],
+        periods: Sequence[float | None], roles: Sequence[str], arguments: tuple[str | Path | Robot, dict[str, Any]],
     ) -> None:  # fmt: skip
         self.robot, self.joints = robot, tuple(joints)
         self._arguments = arguments  # robot and settings as `identify` got them
@@ -133,8 +139,9 @@ class IdentifiedArm:
         weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
         folder = home / "raw" / "arrays"
         folder.mkdir(parents=True)
-        names = [FITTED] if len(logs) == 1 else [f"{FITTED}-{i + 1}" for i in range(len(logs))]
-        entries = [self._saved(folder, *log) for log in zip(names, logs, periods, strict=True)]
+        numbers = [roles[: i + 1].count(role) for i, role in enumerate(roles)]
+        names = [f"{role}-{i}" if len(logs) > 1 else role for role, i in zip(roles, numbers, strict=True)]
+        entries = [self._saved(folder, *log) for log in zip(names, logs, periods, roles, strict=True)]
         self._study = Study(folder, "Arrays", robot, False, settings, tuple(entries))
         self._places = folders(folder, None, None)
         reading = self._run(IDENTIFIED)
@@ -287,7 +294,10 @@ class IdentifiedArm:
         return entry
 
     def _contact_log(self, name: str, columns: Columns, windows: Mapping[str, Any] | None = None) -> LogEntry:
-        return self._saved(self._study.folder, name, columns, None, "contact", **(windows or {}))
+        windows, length = windows or {}, float(columns["time"][-1] - columns["time"][0])
+        is_free = "contact" not in windows and any(a <= 0.0 and b >= length for a, b in windows.get("free", ()))
+        role = VALIDATION if is_free else "contact"  # free throughout
+        return self._saved(self._study.folder, name, columns, None, role, **windows)
 
     def _run(self, stage: str, *more: LogEntry) -> Any:
         """Run the stages up to this one, without output; return what reads the records of a kind."""
@@ -305,7 +315,7 @@ class IdentifiedArm:
         return read
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ExternalEffort:
     """The external effort of the joints along a log: smoothed, with its standard deviation, and its contacts.
 
@@ -315,8 +325,8 @@ class ExternalEffort:
     record: tuple[Track, ...]
     contact_record: tuple[Contact, ...]
     labels: tuple[str, ...]
-    diagnostics: tuple[str, ...] = field(repr=False)
-    _log: tuple[Columns, dict[str, Any]] = field(repr=False)  # for `IdentifiedArm.save`
+    diagnostics: tuple[str, ...]
+    _log: tuple[Columns, dict[str, Any]]  # for `IdentifiedArm.save`
 
     @property
     def t(self) -> Array:
@@ -350,6 +360,11 @@ class ExternalEffort:
             for contact in self.contacts[self.contacts["joint"] == track.joint].itertuples():
                 ax.axvspan(contact.onset, contact.release, color="C1", alpha=0.2)
         return axes
+
+    def __repr__(self) -> str:
+        """The contacts as a table."""
+        found = self.contacts[["joint", "onset", "release", "peak", "peak_std"]]
+        return f"{', '.join(t.joint for t in self.record)}, {len(self.t)} samples, {len(found)} contacts\n{found}"
 
     def _repr_html_(self) -> str:
         return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)

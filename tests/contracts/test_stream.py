@@ -176,6 +176,17 @@ def test_velocities_are_given_always_or_never(small):
     stream.step(2 * T_S, zero, zero)
 
 
+def test_after_a_restart_a_log_may_begin_again(small):
+    stream = Stream(small.document())
+    n, runs = len(stream.coordinates), []
+    for _ in range(2):
+        stream.restart()
+        runs.append([stream.step(k * T_S, np.full(n, 0.01 * k), np.ones(n)) for k in range(80)])
+    first, again = runs
+    assert [effort.status for effort in again] == [effort.status for effort in first]
+    assert_allclose([effort.tau_ext for effort in again], [effort.tau_ext for effort in first])
+
+
 def test_a_gap_starts_anew(small):
     stream, other = Stream(small.document()), Stream(small.document())
     n = len(stream.coordinates)

@@ -331,7 +331,12 @@ class Stream:
         self._latest: deque[float] = deque(maxlen=5)  # times
 
     def restart(self) -> None:
-        """Forget all samples, as after a gap."""
+        """Forget all samples and their times, so that a log may begin again."""
+        self._t, self._pace = -math.inf, 0.0
+        self._latest.clear()
+        self._restart_filters()
+
+    def _restart_filters(self) -> None:
         self._samples.clear()
         for joint in self.filters:
             joint.restart()
@@ -354,7 +359,7 @@ class Stream:
             return self._unknown(t, BAD_INPUT)
         other_rate, gap = self._follow_rate(t), t - self._t > GAP / self.rate
         if other_rate or gap:
-            self.restart()
+            self._restart_filters()
         self._t = t
         self._samples.append(sample)
         if other_rate:
