@@ -493,6 +493,7 @@ WORDS_OF_ROLES = {
     "identification": ("sysid_01", "Ident roll", "train"),
     "validation": (
         "verification",
+        "crossvalidation",
         "cross_val",
         "no contact 3",
         "frei",
@@ -509,6 +510,7 @@ WORDS_OF_ROLES = {
         "verifica",
     ),
     "contact": (
+        "balance_test",
         "pull_test",
         "with_force",
         "Kontakt",
@@ -541,6 +543,14 @@ def test_the_excitation_identifies_and_the_check_validates_in_other_languages(tm
     assert GUESSED not in said
     roles = {entry.name: entry.role for entry in reading.read(tmp_path).logs}
     assert list(roles.values()) == ["identification", "validation"]
+
+
+def test_a_log_called_a_test_whose_effort_has_outliers_is_to_be_checked(tmp_path):
+    t, q, dq = motion(1)
+    pushed = 60.0 * (np.abs(t - t[N // 2]) < 0.05 * t[-1])
+    table(tmp_path / "roll_excitation.csv", t, q, dq, effort(q, dq))
+    table(tmp_path / "roll_test.csv", t, q, dq, effort(q, dq) + pushed[:, None])
+    assert 'CHECK: "test" in its name, but the effort of joint 1 has outliers' in new(tmp_path)
 
 
 @pytest.mark.parametrize("farther", [1.1, 1.5])

@@ -361,6 +361,9 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     said = opening.verdict_sentence(full, [narrow])
     where = f"above its alarm level: {level} on the hand roll (whose 95 % band is too narrow)"
     assert said == f"An effort stands out from free motion {where}."
+    [wide] = trusts(full, hand_roll=0.05)
+    wide = replace(wide, space=replace(wide.space, coverage=0.995))
+    assert opening.verdict_sentence(full, [wide]).endswith("is wide enough, too wide on the hand roll.")
     [same] = trusts(full, hand_roll=0.16)
     same = replace(same, prediction=replace(same.prediction, path="same path"))
     assert "On the fitted path the model errs by 16 % on the hand roll, and another path was not tested" in (
@@ -535,7 +538,9 @@ def test_the_paragraph_counts_of_averaged_logs_whole_periods_alone(full: Context
     assert all(about.shown_fit(joint.name).periods for joint in study.robot.joints)
     text = paragraph(about)
     data = "averages over the whole periods of 4 simulated logs at 50 Hz, 36 s in all"
-    assert f"identified from {data} (roll: 3 periods of 2.000 s; again, pitch, slide: 5 periods of 2.000 s)." in text
+    assert (
+        f"identified from {data} (roll: 3 periods of 2.000 s; again, pitch, slide: 5 periods of 2.000 s each)." in text
+    )
     assert "low-pass of" not in text.partition("Results")[2].partition("For the errors")[0]
     assert "The model was independent.lse." in text
 
@@ -717,6 +722,26 @@ def test_narrow_bands_of_several_joints_are_one_caveat(full: Context):
     assert list(caveats.looks_at_narrow_bands(full, trusts(full, hand_roll=0.05))) == []
 
 
+def test_page_one_states_the_level_of_a_push_that_is_held(full: Context):
+    [contact] = full.catalogue.select(Contact, log="push", joint="hand_roll")
+    for share, is_held in ((0.95, True), (0.75, False)):
+        held = replace(contact, peak=-contact.peak, middle_mean=-share * contact.peak)
+        number = full.number("contact.push.hand_roll.1.middle_mean", 3)
+        assert (f" s, held at {number})" in summary.peaks_in_words(full, [held])) == is_held
+
+
+def test_the_figure_of_page_one_shows_a_contact_log_before_a_free_one_in_which_a_contact_was_found(full: Context):
+    [push] = full.catalogue.select(Contact, log="push", joint="hand_roll")
+    [tip] = full.catalogue.select(Contact, log="tip", joint="hand_roll")
+    pitch = full.catalogue.select(Contact, log="tip", joint="hand_pitch")
+    in_free = replace(push, log="check")
+    assert full.study.log("check").role != "contact"
+    records = [in_free, tip, *pitch]
+    about = replace(full, catalogue=Catalogue(lambda k: records if k is Contact else full.catalogue.records(k)))
+    [panel] = summary.effort_panel(about, trusts(full, hand_roll=0.05)[0])
+    assert panel.title == "Hand roll, tip"  # though it touches another joint, too
+
+
 def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Context):
     [contact, *_] = full.catalogue.records(Contact)
     twice = Catalogue(lambda kind: [contact, contact] if kind is Contact else full.catalogue.records(kind))
@@ -808,8 +833,9 @@ def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catal
     assert f"**{sum(map(len, found))} contacts found {level}; the study states no window of contact." in said
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
-    windows = f"in {number} of {number}, the effort exceeds the detection level"
-    assert f"{windows}, in {number} of them with its peak only." in summary.opening_paragraph(about, ones)
+    said = summary.opening_paragraph(about, ones)
+    assert f"**Of {number} cases (stated windows, counted once for each joint on which they are measured), " in said
+    assert f"exceeds the detection level in {number}, in {number} of them with its peak only." in said
     about = context(lab, without(catalogue, Contact))
     assert (
         "No contact is measured: none was found, and the study states no window of contact."

@@ -87,8 +87,11 @@ def _by_word(recording: Evidence, kind: str, word: str) -> Role | None:
     if recording.touches_tissue and (kind in ("", "tissue", "contact", "test") or not recording.holding.meanings):
         return Role("tissue", "it has a depth and a force")
     match kind:
-        case "free" | "empty" | "test":
-            return Role("validation", reason if kind == "test" else f"{reason}: free motion for validation")
+        case "free" | "empty":
+            return Role("validation", f"{reason}: free motion for validation")
+        case "test":
+            touched = _touched(recording.holding).removeprefix("CHECK: ")
+            return Role("validation", f"CHECK: {reason}, but {touched}" if touched else reason)
         case "weight":
             mass = MASS.search(word)
             kilograms = float(mass[1].replace("p", ".")) * (1.0 if mass[2] == "kg" else 1e-3) if mass else 0.0

@@ -126,7 +126,8 @@ def data_in_words(context: Context, fits: Sequence[Fit]) -> Iterator[str]:
             motions.setdefault(motion, []).append(summary.log)
         if rates:
             rate = " to ".join(dict.fromkeys(f"{of(rates):.4g}" for of in (min, max)))
-            listed = "; ".join(f"{', '.join(sorted(logs))}: {motion}" for motion, logs in motions.items())
+            each = {motion: " each" * (len(logs) > 1 and motion[0].isdigit()) for motion, logs in motions.items()}
+            listed = "; ".join(f"{', '.join(sorted(logs))}: {motion}{each[motion]}" for motion, logs in motions.items())
             yield f"{data} {count(len(rates), kind)} at {rate} Hz, {seconds:.0f} s in all ({listed})"
 
 
@@ -143,6 +144,7 @@ def unseen_score(context: Context, joint: str) -> str:
     error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"
     levels = ("threshold.{}.detection_level", "threshold.{}.alarm_level", "band.{}.coverage")
     keys = {level.rpartition(".")[2].replace("_", " "): level.format(joint) for level in levels}
+    keys = {"mean coverage" if name == "coverage" else name: key for name, key in keys.items()}
     scores = [error, *(f"{name} {context.number(key, 2)}" for name, key in keys.items() if key in context.results)]
     model = f"{fit.structure} model by {title_of(fit.estimator)} ({', '.join(parts)})"
     return f"{joint.replace('_', ' ')}: {model}, {', '.join(scores)}"

@@ -24,6 +24,7 @@ TOUCHED: Colour = "sky"  # of contact windows
 REST: Colour = "yellow"  # of standstill
 MAX_IN_COLUMN = 3  # panels below each other on page one
 MAX_PEAKS = 6  # contacts of which page one states each peak
+HELD = 0.9  # of its peak: the mean of the middle half of a push that is held; of a triangle it is three quarters
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -141,7 +142,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
     fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
     each = "counted once for each joint on which they are measured"
-    exceeds = f"Stated windows, {each}: in {above} of {stated}, the effort exceeds the detection level{fewer}."
+    cases = f"{count(stated, 'case')} (stated windows, {each})"
+    exceeds = f"Of {cases}, the effort exceeds the detection level in {above}{fewer}."
     return f"{text} **{exceeds}{outside}{peaks}**"
 
 
@@ -161,7 +163,8 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     named = f" in {literal(*logs)}" if len(logs) == 1 < len(above) else ""  # once for all
     peaks = [
         f"{context.number(f'contact.{of.log}.{of.joint}.{row + 1}.peak', 3)} on {name_in_sentence(of.joint)} "
-        f"({'' if named else f'{literal(of.log)}, '}{of.onset[row]:.1f} to {of.release[row]:.1f} s)"
+        f"({'' if named else f'{literal(of.log)}, '}{of.onset[row]:.1f} to {of.release[row]:.1f} s"
+        f"{held_level(context, of, row)})"
         for of, row in above
     ]
     text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
@@ -174,6 +177,13 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
         if t.joint in sought - touched
     ]
     return f"{text} None on {as_list(levels)}." if peaks and levels else text
+
+
+def held_level(context: Context, contact: Contact, row: int) -> str:
+    """The mean of the middle half of a push that is held, so that it is near the peak; else ""."""
+    mean = f"contact.{contact.log}.{contact.joint}.{row + 1}.middle_mean"
+    is_held = contact.middle_mean[row] * np.sign(contact.peak[row]) > HELD * abs(contact.peak[row])
+    return f", held at {context.number(mean, 3)}" if is_held else ""
 
 
 def efforts_in_words(context: Context) -> str:
@@ -192,7 +202,8 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     errors = {p.log: p.model_error for p in parts.scored_predictions(context, trusted.joint)}
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
     by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
-    logs = [log for log in by_error if len(touched[log]) == 1] or by_error
+    of_contact = [log for log in by_error if context.study.log(log).role == "contact"] or by_error
+    logs = [log for log in of_contact if len(touched[log]) == 1] or of_contact
     untouched = [
         t.log
         for t in context.catalogue.select(Track, joint=trusted.joint)

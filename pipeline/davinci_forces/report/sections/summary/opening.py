@@ -40,7 +40,9 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     roles = {trusted.space.role for trusted in trusts if trusted.space is not None}
     if roles and not any(trusted.narrow for trusted in trusts):
         where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
-        parts += [f"{where} the 95 % band of each joint is wide enough"]
+        wide = [t for t in trusts if t.narrowest is not None and band(t.narrowest.coverage) == "info"]
+        which = f", too wide on {as_list([name_in_sentence(t.joint) for t in wide])}" if wide else ""
+        parts += [f"{where} the 95 % band of each joint is wide enough{which}"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -74,7 +76,8 @@ def feedback(context: Context) -> Iterator[str]:
     """The stiffest tissue that haptic feedback could render stably to each simulated hand."""
     limits = [limit for limit in context.catalogue.records(HandLimit) if np.isfinite(limit.k_t_limit)]
     rendered = [
-        f"{context.number(f'stability.{limit.hand}.k_t_limit', 3)} with hand “{hand_name(context, limit.hand)}”"
+        f"{context.number(f'stability.{limit.hand}.k_t_limit', 3)} with hand “{hand_name(context, limit.hand)}” "
+        f"({limit.hand_mass:.3g} kg, {limit.hand_damping:.3g} N s/m, {limit.hand_stiffness:.3g} N/m)"
         for limit in limits
     ]
     if rendered:
