@@ -22,6 +22,7 @@ from davinci_forces.records import (
     Fit,
     FreeSpace,
     Identifiability,
+    Load,
     LogSummary,
     PeriodResidual,
     Prediction,
@@ -740,6 +741,19 @@ def test_the_figure_of_page_one_shows_a_contact_log_before_a_free_one_in_which_a
     about = replace(full, catalogue=Catalogue(lambda k: records if k is Contact else full.catalogue.records(k)))
     [panel] = summary.effort_panel(about, trusts(full, hand_roll=0.05)[0])
     assert panel.title == "Hand roll, tip"  # though it touches another joint, too
+
+
+def test_the_effort_of_a_mass_is_drawn_with_the_offset_of_the_day(full: Context):
+    [weight, *_] = full.catalogue.records(Weight)
+    loads = [load for load in full.catalogue.select(Load, log=weight.log) if load.joint in weight.loaded]
+    offsets = np.arange(1.0, len(weight) + 1)
+    for stated, mass in ((0.2, 0.2), (np.nan, 0.3)):  # the estimated mass where none is stated
+        of = replace(weight, joint_offset=offsets, stated_mass=stated, mass=0.3)
+        panels = weight_section.figure(of, loads).panels
+        assert len(panels) == len(loads) > 0
+        for panel, load in zip(panels, loads, strict=True):
+            offset = offsets[list(weight.loaded).index(load.joint)]
+            assert_allclose(panel.marks[1].y, mass * load.load + offset)
 
 
 def test_windows_of_the_contact_table_have_the_numbers_of_the_figure(full: Context):
