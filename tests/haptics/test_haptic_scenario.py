@@ -14,6 +14,7 @@ from davinci_forces.errors import BadStudy
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, BadHaptics, read
 from davinci_forces.runner.fingerprint import canonical
+from davinci_forces.runner.reporting import study_files
 from davinci_forces.study import HapticScenario, reading
 from tests import arm
 
@@ -179,7 +180,9 @@ def study(tmp_path):
 def test_a_study_names_the_file_of_its_scenario(study):
     folder = study('"mine.toml"')
     written(folder, SHORT)
-    assert reading.read(folder).haptics.stiffness == 100.0
+    read = reading.read(folder)
+    assert read.haptics.stiffness == 100.0
+    assert study_files(read) == ("study.toml", read.robot.file, "mine.toml")  # so a report states its hash
 
 
 def test_problems_of_that_file_are_said_with_those_of_the_study(study):

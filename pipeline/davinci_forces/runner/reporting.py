@@ -114,5 +114,5 @@ def environment() -> str:
 
 def study_files(study: Study) -> tuple[str, ...]:
     """The files of a study other than its logs."""
-    names = ("study.toml", study.robot.file, "truth.toml" if study.truth else "", study.baseline)
+    names = ("study.toml", study.robot.file, "truth.toml" if study.truth else "", study.haptics_file, study.baseline)
     return tuple(name for name in names if name)

@@ -132,6 +132,7 @@ class Study:
     changed: dict[str, Any] = field(default_factory=dict)  # properties of the robot that the study changes
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
     haptics: HapticScenario = field(default_factory=HapticScenario)  # the simulated hand that feels the tissue
+    haptics_file: str = ""  # that describes them, in the study's folder
     baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
     remarks: tuple[str, ...] = field(default=(), compare=False)  # warnings for the author, each with its line

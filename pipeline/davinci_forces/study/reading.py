@@ -71,9 +71,8 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     assert robot is not None
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
     changed = overrides.values | {name: table.values[name] for name in ("tool", "base") if name in table}
-    return Study(
-        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, lines, tuple(remarks)
-    )
+    about = changed, truth, scenario, table.values.get("haptics", ""), baseline, lines, tuple(remarks)
+    return Study(folder, title, robot, simulated, settings, logs, *about)
 
 
 def _note_missing_clocks(table: TomlTable, logs: Sequence[LogEntry], folder: Path) -> None:
