@@ -101,7 +101,7 @@ demo: $(READY) ## simulate the demonstration study anew
 
 pictures: ## draw the README's pictures anew, from the report of the demonstration study (needs pdftoppm)
 	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/page-one
-	pdftoppm -r 65 -f 9 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
+	pdftoppm -r 65 -f 10 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
 
 clean: ## remove what was made: the results of every study, and the environment
 	rm -rf .venv build *.egg-info processed/* reports/*

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
-from davinci_forces.report.content import Number, Prose, Verdict, literal
+from davinci_forces.report.content import Level, Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass, hand_name
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, doubt_of_mass, percent, stiffness_level
@@ -108,8 +108,12 @@ def masses(context: Context) -> Iterator[str]:
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
         level, why = grade_of_mass(context, weight)
         stated += ", which seems to have given a torque constant in use: no test of it" * (why == "taken")
-        graded = f": {WORDS[level]}" if level in WORDS else ""
-        yield f"**{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}{graded}"
+        yield f"**{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}{verdict_at_end(level)}"
+
+
+def verdict_at_end(level: Level) -> str:
+    """A verdict at the end of a line, if it is one."""
+    return f": {WORDS[level]}" if level in WORDS else ""
 
 
 def stiffnesses(context: Context) -> Iterator[str]:
@@ -120,7 +124,7 @@ def stiffnesses(context: Context) -> Iterator[str]:
         quartiles = f", quartiles {low} and {high}" if log.pushes >= MIN_QUARTILES else ""
         why = "; a straight line explains less than 90 % of the others" if log.pushes < len(log) else ""
         used = f" ({log.pushes} of {count(len(log), 'push')}{why})"
-        yield f"{WORDS.get(level, '')} **{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}".strip()
+        yield f"**{literal(log.log)}**: stiffness {stiffness}{quartiles}{used}{verdict_at_end(level)}"
 
 
 def currents_in_words(context: Context) -> str:
