@@ -181,9 +181,9 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
             yield ""
             yield f"[robot_overrides.{joint.name}]  # its current becomes an effort by these; CHECK your drive"
             ratio, at_joint = ("rad/m", "N/A") if joint.kind is Kind.PRISMATIC else ("rad/rad", "N m/A")
-            yield f"# gear_ratio = {joint.gear_ratio!r}  # [{ratio}]; 1.0 where positions and constant are of the joint"
-            scaled = f"at the joint [{at_joint}]; efforts scale with both; a mass tests them"
-            yield f"# torque_constant = {joint.torque_constant!r}  # [N m/A] at the motor, or {scaled}"
+            yield f"# gear_ratio = {joint.gear_ratio!r}  # [{ratio}]; 1.0 if positions and constant are at the joint"
+            at_joint = f"with gear_ratio = 1.0 at the joint [{at_joint}]; efforts scale with both; a mass tests them"
+            yield f"# torque_constant = {joint.torque_constant!r}  # [N m/A] at the motor, or {at_joint}"
 
 
 def _joints_by_current(robot: Robot, drawn: Sequence[DraftLog]) -> list[Joint]:
