@@ -177,8 +177,7 @@ class IdentifiedArm:
         BadRequest
             If the arrays are wrong, or no joint has a model.
         """
-        values = {"q": q, "tau": np.zeros(np.shape(q))} | ({} if dq is None else {"dq": dq})
-        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
+        columns = self._columns(t, q, np.zeros(np.shape(q)), dq)
         reading = self._run(PREDICTED, self._contact_log(NEW, columns))
         models = [model for model in reading(JointModel) if model.log == NEW]
         if not models:
@@ -207,8 +206,7 @@ class IdentifiedArm:
             If the arrays are wrong, or no joint has a model.
         """
         windows = {name: [[*window] for window in of] for name, of in (("free", free), ("contact", contact)) if len(of)}
-        values = {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq})
-        [columns] = columns_of([t], {name: [x] for name, x in values.items()}, self.joints)
+        columns = self._columns(t, q, tau, dq)
         reading = self._run(MEASURED, self._contact_log(NEW, columns, windows))
         tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
         texts = new_texts(reading)
@@ -293,6 +291,11 @@ class IdentifiedArm:
         refuse(table)
         return entry
 
+    def _columns(self, t: Samples, q: Samples, tau: Samples, dq: Samples) -> Columns:
+        given = {"q": [q], "tau": [tau]} | ({} if dq is None else {"dq": [dq]})
+        [columns] = columns_of([t], given, self.joints)
+        return columns
+
     def _contact_log(self, name: str, columns: Columns, windows: Mapping[str, Any] | None = None) -> LogEntry:
         windows, length = windows or {}, float(columns["time"][-1] - columns["time"][0])
         is_free = "contact" not in windows and any(a <= 0.0 and b >= length for a, b in windows.get("free", ()))
@@ -363,8 +366,9 @@ class ExternalEffort:
 
     def __repr__(self) -> str:
         """The contacts as a table."""
-        found = self.contacts[["joint", "onset", "release", "peak", "peak_std"]]
-        return f"{', '.join(t.joint for t in self.record)}, {len(self.t)} samples, {len(found)} contacts\n{found}"
+        contacts = self.contacts[["joint", "onset", "release", "peak", "peak_std"]]
+        joints = ", ".join(track.joint for track in self.record)
+        return f"{joints}, {len(self.t)} samples, {len(contacts)} contacts\n{contacts}"
 
     def _repr_html_(self) -> str:
         return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)

@@ -143,8 +143,8 @@ def reason(
         elif more <= error:
             why = (
                 f"models that {kind} are preferred unless all are clearly worse, and {close} is not ({more:.4f}, with "
+                f"{error:.4f}); of them, the one with the least error is chosen"
             )
-            why += f"{error:.4f}); of them, the one with the least error is chosen"
         else:
             why = "it gave way to a smaller model, which errs more than the chosen one"
         text += (

@@ -142,9 +142,9 @@ def unseen_score(context: Context, joint: str) -> str:
     parts += [] if fit.periods else [f"low-pass of {fit.cutoff[efforts.index(joint)]:g} Hz"]
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
     error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"
-    levels = ("threshold.{}.detection_level", "threshold.{}.alarm_level", "band.{}.coverage")
-    keys = {level.rpartition(".")[2].replace("_", " "): level.format(joint) for level in levels}
-    keys = {"mean coverage" if name == "coverage" else name: key for name, key in keys.items()}
+    levels = ("detection level", "alarm level")
+    keys = {name: f"threshold.{joint}.{name.replace(' ', '_')}" for name in levels}
+    keys["mean coverage"] = f"band.{joint}.coverage"
     scores = [error, *(f"{name} {context.number(key, 2)}" for name, key in keys.items() if key in context.results)]
     model = f"{fit.structure} model by {title_of(fit.estimator)} ({', '.join(parts)})"
     return f"{joint.replace('_', ' ')}: {model}, {', '.join(scores)}"

@@ -67,9 +67,9 @@ def not_followed(scenario: FullScenario, arm_from: str) -> Diagnostic:
     """Warn that the simulated arm is unstable by itself, as with an inertia that the logs hardly determine."""
     text = f"arm: its simulated controller does not stabilise {scenario.body.inertia:.2g} kg, the inertia of {arm_from}"
     remedy = (
-        "state the gains [arm.control] and the drivers' period `tick` of your arm in the file that `haptics` names; "
+        "state the gains [arm.control] and the drivers' period `tick` of your arm in the file that `haptics` names; if "
+        "the inertia is wrong, record a faster motion, or state [arm.body]"
     )
-    remedy += "if the inertia is wrong, record a faster motion, or state [arm.body]"
     message = f"{text}, so no limit of haptic feedback is computed; {remedy}"
     return diagnostic("haptic-limits", "arm.followed", "warning", message)
 
