@@ -60,8 +60,6 @@ def _plain(value: Any) -> Any:
 def _lines(
     differing: list[Change], before: dict[str, StatedValue], after: dict[str, StatedValue], most: int
 ) -> list[str]:
-    """The comparison as lines of text, with at most `most` changes of a joint."""
-
     def counts(some: list[Change]) -> str:
         number = Counter(change.subject for change in some)
         return ": " + ", ".join(f"{number[about]} of {about}" for about in RANKS if number[about]) if some else ""

@@ -79,7 +79,6 @@ def run(
 
 
 def _progress() -> "ReportStart":
-    """A function that prints a line after each start, with the time to go."""
     began = time.monotonic()
 
     def say(start: int, starts: int, value: float) -> None:
@@ -140,7 +139,6 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
 
 
 def _error_lines(parameters: "Sequence[ExpectedParameter]") -> list[str]:
-    """Expected standard errors, one parameter a line."""
     lines = [f"    {p.name}: {p.std:.3g} {p.unit}" for p in parameters]
     return ["  expected standard errors, from one period with white noise:", *lines] if lines else []
 

@@ -89,7 +89,6 @@ def _write_csv(file: Path, run: "HapticRun") -> None:
 
 
 def _format_text(answer: Answer) -> str:
-    """The results as text, one paragraph per hand."""
     lines = [f"{answer['title']}, simulated, against tissue of {answer['tissue_stiffness']:.4g} N/m.", ""]
     lines += ["Frequency, felt stiffness in % of the true one, and delay of the felt force:"]
     for row in answer["response"]:

@@ -119,7 +119,6 @@ def _joints(robot: "Robot") -> dict[str, Any]:
 
 
 def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
-    """M, C dq and G, or None for a robot without known masses."""
     from davinci_forces.maths.mechanics import rigid_body
 
     if robot.chain is None or robot.bodies is None:

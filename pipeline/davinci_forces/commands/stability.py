@@ -90,7 +90,6 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
 
 
 def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float | None) -> str:
-    """The limits as text, one line each."""
     from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE
     from davinci_forces.haptics.maths.delay import damping_needed, delay_limit
 

@@ -123,7 +123,6 @@ def felt_share(scenario: FullScenario, frequency: float) -> complex:
 
 
 def _run(scenario: FullScenario, hand: Hand, push: Array, noise: Array, x_0: float, path: Array = NO_PATH) -> LoopRun:
-    """Simulate the loop once."""
     periods = [round(1.0 / rate / scenario.tick) for rate in (scenario.rate, scenario.link_rate)]
     delays = [math.ceil(x / scenario.tick - 1e-9) for x in (scenario.position_delay, scenario.force_delay)]
     clocks = Clocks(scenario.tick, *periods, *delays)

@@ -170,7 +170,6 @@ def scenario_of(table: TomlTable) -> HapticScenario:
 
 
 def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
-    """Read every [[hand]]."""
     hands = []
     for entry in table.tables("hand"):
         name = entry.text("name")

@@ -115,7 +115,6 @@ class SheetLog(Log):
                 yield self.count_nans(block, missing)
 
     def _number(self, cell: Any, row: int, name: str) -> float:
-        """Convert a cell to a number, NaN where it is empty."""
         if cell is None or cell == "":
             return float("nan")
         if isinstance(cell, datetime):

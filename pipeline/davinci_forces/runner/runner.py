@@ -115,7 +115,6 @@ class Runner:
                 self._remove_leftovers()
 
     def _remove_leftovers(self) -> None:
-        """Remove half-written files of an interrupted run or a killed process."""
         for leftover in [*leftovers(self.folders.processed), *leftovers(self.folders.reports)]:
             leftover.unlink(missing_ok=True)
 
@@ -223,7 +222,6 @@ class Runner:
         return due
 
     def _reasons(self, task: Task) -> list[str]:
-        """Reasons to run a task; none if it is up to date."""
         if self._is_forced(task):
             return ["--force"]
         return self.ledger.reasons(self.ledger.entry(task.step, task.name), task.fingerprint)
@@ -233,7 +231,6 @@ class Runner:
         return self.force and stage_of(task.step) in self._named
 
     def _record(self, outcome: Outcome) -> None:
-        """Record the outcome of a task in the ledger, and print its messages."""
         task, stage = outcome.task, stage_of(outcome.task.step)
         if self.console.is_verbose:
             self.console.say(f"{stage}: {task.name}: took {outcome.seconds:.2f} s")
@@ -254,7 +251,6 @@ def _has_tasks(part: Part) -> bool:
 
 
 def _part(step: str, task: str) -> Part:
-    """The part of a step that the task of this name belongs to."""
     return Part(step, ALL_LOGS if step == REPORT else log_of(declaration(step), task))
 
 

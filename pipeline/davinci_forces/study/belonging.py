@@ -155,7 +155,6 @@ def _joint_names(holding: Holding) -> list[str]:
 
 
 def _prismatic(holdings: Sequence[Holding]) -> set[int]:
-    """Joints whose positions or efforts are in units of length or force."""
     return {
         meaning.joint
         for holding in holdings

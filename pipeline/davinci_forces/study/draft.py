@@ -187,7 +187,6 @@ def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
 
 
 def _joints_by_current(robot: Robot, drawn: Sequence[DraftLog]) -> list[Joint]:
-    """The joints whose effort is known by the current of their motor."""
     by_current = {k for draft in drawn for k in draft.guess.joints_with(("i",))}
     return [joint for k, joint in enumerate(robot.joints) if k in by_current]
 

@@ -155,7 +155,6 @@ def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
 
 
 def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:
-    """The problem of a log's tare, or ""."""
     if log.role != "weight":
         return f"tare = {log.tare!r} is only for logs of role weight, but this log has role {log.role}"
     tare = by_name.get(log.tare)

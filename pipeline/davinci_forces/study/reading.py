@@ -101,7 +101,6 @@ def _baseline(table: TomlTable, folder: Path) -> str:
 
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:
-    """The robot, or None where its joints are unknown."""
     expected = f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
     name = table.take("robot", None, (str,), expected)
     if name is None:
@@ -144,7 +143,6 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
 
 
 def _with_tool(robot: Robot | None, tool: TomlTable) -> Robot | None:
-    """The robot with the tool length that the study gives."""
     length = check_positive(tool, "length", tool.number("length", expected="a number of metres", kind="tool"))
     return robot.with_tool(length) if robot and math.isfinite(length) else robot
 
@@ -193,7 +191,6 @@ def settings_of(table: TomlTable, robot: Robot | None) -> Settings:
 
 
 def _wanted_effort(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
-    """The external effort to be detected on each joint."""
     names, wanted = [joint.name for joint in robot.joints] if robot else [], {}
     for name in efforts.values:
         if robot and name not in names:

@@ -194,7 +194,6 @@ def _spans(holding: Holding) -> dict[int, float]:
 
 
 def _reach(holding: Holding) -> float:
-    """The sum of the ranges of the joints that move."""
     return sum(_spans(holding).values())
 
 

@@ -184,7 +184,6 @@ def _felt_force(device: Any, clocks: Any, now: int, sent: Any, estimates: Any) -
 
 @inline
 def _move_arm(arm: Any, tissue: Any, h: float) -> None:
-    """Advance the arm by one tick."""
     q, dq, free = np.empty(1), np.empty(1), np.empty(1)
     middle(arm.state, h, q, dq)
     free[0] = arm.tau[0] - tissue_force(tissue, q[0], dq[0])
@@ -193,7 +192,6 @@ def _move_arm(arm: Any, tissue: Any, h: float) -> None:
 
 @inline
 def _move_hand(grip: Any, hand: Any, net: float, now: int) -> None:
-    """Advance the hand by one tick, under a constant net force [N]."""
     if len(grip.path):
         hand[0], hand[1] = grip.path[now + 1, 0], grip.path[now + 1, 1]
         return

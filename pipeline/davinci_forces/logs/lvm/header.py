@@ -129,7 +129,6 @@ def _sampling(tags: dict[str, list[str]], column: int, start: Decimal | None) ->
 
 
 def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
-    """Return the cell of a tag for one column of a row, or ""."""
     cells = tags.get(tag, [])
     return cells[column - 1] if 0 < column <= len(cells) else ""
 

@@ -202,7 +202,6 @@ class _Walk:
         return range(at, at + size)
 
     def layout(self, kind: str, first: Layout | None) -> Layout:
-        """Name the numbers."""
         layout = Layout(
             names=self.names, stamp=self.stamp, fixed=np.array([at for places in self.fixed for at in places], np.intp)
         )

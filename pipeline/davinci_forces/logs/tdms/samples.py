@@ -134,7 +134,6 @@ def side_by_side(
 
 
 def _recut(source: Iterator[Block], rows: int) -> Iterator[Block]:
-    """Join and cut pieces to blocks of so many rows; only the last is shorter."""
     waiting: list[Block] = []
     length = 0
     for piece in source:

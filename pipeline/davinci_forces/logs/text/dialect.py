@@ -168,7 +168,6 @@ def _are_numbers_of_columns(cells: Sequence[str], columns: Sequence[Sequence[str
 
 
 def _kind_of(cells: Sequence[str], number: re.Pattern[str]) -> str:
-    """The kind of a column: text if it has cells and none of them is a number."""
     filled = [cell for cell in cells if cell and cell not in MISSING]
     return "text" if filled and not any(map(number.fullmatch, filled)) else "number"
 

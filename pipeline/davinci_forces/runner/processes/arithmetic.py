@@ -55,7 +55,6 @@ _loaded_unpinned = False  # numpy was loaded before `pin` was called, without th
 
 @cache
 def _features() -> set[str]:
-    """The features of the processor, where the system lists them in a file."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

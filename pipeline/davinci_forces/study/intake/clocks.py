@@ -201,7 +201,6 @@ class UsedClocks:
 
 
 def _how(name: str, follower: Follower) -> str:
-    """How the channels of one clock were resampled."""
     rate = f"{name} ({1 / follower.period:.6g} Hz)" if follower.period else name
     if not follower.interpolated and follower.ratio == 1.0:
         return f"{rate} has the same times"
