@@ -48,11 +48,9 @@ class Joined(Log):
         self.parts = dict(zip(unique([Path(name.removesuffix(".gz")).stem for name in names]), parts, strict=True))
         self.lent = {f"{stem}/{n}": f"{stem}/{c}" for stem, part in self.parts.items() for n, c in part.lent.items()}
         starts = starts_of(parts)
-        since = [(start - starts[0]).total_seconds() for start in starts] or [0.0] * len(parts)
-        self.offsets = dict(zip(self.parts, since, strict=True))
-        self.remarks = [] if starts else [
-            "not all joined files say when they started; their clocks are assumed to have the same zero"
-        ]  # fmt: skip
+        self.offsets = dict(zip(self.parts, starts or [0.0] * len(parts), strict=True))
+        remark = "not all joined files say when they started; their clocks are assumed to have the same zero"
+        self.remarks = [] if starts else [remark]
         self.of: dict[str, str] = {}  # the file of each channel
         self.counted: dict[str, str] = {}  # derived time channels, each with a channel of as many samples
         self.channels = tuple(channel for stem, part in self.parts.items() for channel in self._channels(stem, part))
@@ -164,10 +162,8 @@ def align(
     if done.others and not done.kept:
         compared = {"the positions runs": clock} | {name: follower.clock for name, follower in done.others.items()}
         spans = [f"of {whose} from {c.first:.6g} to {c.last:.6g} s" for whose, c in compared.items()]
-        raise refuse(
-            f"the clock {', that '.join(spans)}: they do not overlap; record them together, or leave out the channels "
-            "of one"
-        )
+        remedy = "record them together, or leave out the channels of one"
+        raise refuse(f"the clock {', that '.join(spans)}: they do not overlap; {remedy}")
 
 
 def _period(t: Array) -> float:
@@ -181,11 +177,9 @@ def _update(clock: clocks.ClockStatistics, t: Array, whose: str, refuse: Refuse)
         raise refuse(f"the time of {whose} is not finite at row {row} (counted from 0); record it again")
     clock.update(t)
     if clock.backward or clock.repeated:
-        raise refuse(
-            f"the time of {whose} does not increase at row {clock.bad_row} (counted from 0): "
-            f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; leave these channels out, or set "
-            "rate = ... [Hz] to count samples instead"
-        )
+        where = f"at row {clock.bad_row} (counted from 0): {clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s"
+        remedy = "leave these channels out, or set rate = ... [Hz] to count samples instead"
+        raise refuse(f"the time of {whose} does not increase {where}; {remedy}")
 
 
 class Follower:
@@ -201,10 +195,9 @@ class Follower:
         following = self._next()
         self.period = _period(following[0]) if following else 0.0  # [s] median sampling time
         if self.period > clocks.MAX_PERIOD_RATIO * period:
-            raise refuse(
-                f"{name} is sampled every {self.period:.4g} s, more than {clocks.MAX_PERIOD_RATIO:g} times as slow as "
-                f"the positions (every {period:.4g} s): too slow to interpolate; record it faster, or leave it out"
-            )
+            pace = f"more than {clocks.MAX_PERIOD_RATIO:g} times as slow as the positions (every {period:.4g} s)"
+            remedy = "too slow to interpolate; record it faster, or leave it out"
+            raise refuse(f"{name} is sampled every {self.period:.4g} s, {pace}: {remedy}")
         ratio = period / self.period if self.period else 1.0
         self.ratio = ratio if ratio > MIN_RATIO_FILTERED else 1.0  # of sampling rates, if the faster is low-passed
         self.within = np.nan  # [s] distance of stamps that are the same; unknown before the first

@@ -54,12 +54,9 @@ class Parts(Log):
         self.facts = {"parts": ", ".join(part.path.name for part in parts), **first.facts}
         self.cut, self.lent = parts[-1].cut, first.lent
         self.starts = starts_of(parts)
-        self.remarks: list[str] = []
+        remark = "not all parts say when they started; each is assumed to begin directly after the one before"
+        self.remarks = [remark] if first.clock and not self.starts else []
         self.times: dict[str, frozenset[str]] = {}  # by time channel, the channels on that clock
-        if not self.starts and first.clock:
-            self.remarks.append(
-                "not all parts say when they started; each is assumed to begin directly after the one before"
-            )
         if self.starts or (first.clock and any(part.clock != first.clock for part in parts)):
             self._place()
 
@@ -68,9 +65,8 @@ class Parts(Log):
         _require_order(self.parts, self.starts)
         shared = _partition(self.parts[0])
         if any(_partition(part).keys() != shared.keys() for part in self.parts):
-            raise self.bad(
-                "the parts of this log do not have the same channels on one clock; give each as a separate log"
-            )
+            why = "the parts of this log do not have the same channels on one clock"
+            raise self.bad(f"{why}; give each as a separate log")
         written = [channel for channel in self.channels if not (channel.derived and channel.kind == "time")]
         names = [channel.name for channel in written]
         for names_of_clock in shared:
@@ -124,9 +120,8 @@ class Parts(Log):
 
 
 def _written(log: Log) -> list[tuple[str, str, str]]:
-    return [
-        (c.name, c.unit, c.kind) for c in log.channels if not (c.derived and c.kind == "time") and c.name != "elapsed"
-    ]
+    channels = (c for c in log.channels if not (c.derived and c.kind == "time"))
+    return [(c.name, c.unit, c.kind) for c in channels if c.name != "elapsed"]
 
 
 def _partition(log: Log) -> dict[frozenset[str], str]:
@@ -136,26 +131,26 @@ def _partition(log: Log) -> dict[frozenset[str], str]:
     return {frozenset(names): time or log.time for time, names in groups.items()}
 
 
-def starts_of(parts: Sequence[Log]) -> list[datetime]:
-    """List the starts of the parts; empty unless all state one in the same time zone."""
+def starts_of(parts: Sequence[Log]) -> list[float]:
+    """List the starts of the parts [s], from that of the first; empty unless all state one in the same time zone."""
     texts = [part.started for part in parts]
     if not all(texts) or len({part.zone for part in parts}) > 1:
         return []
     starts = [datetime.fromisoformat(text) for text in texts]
     clocked = all(part.time or part.clock or any(channel.time for channel in part.channels) for part in parts)
-    return starts if clocked and not any(text.startswith(UNSET_START) for text in texts) else []
+    is_set = not any(text.startswith(UNSET_START) for text in texts)
+    return [(start - starts[0]).total_seconds() for start in starts] if clocked and is_set else []
 
 
-def _require_order(parts: Sequence[Log], starts: Sequence[datetime]) -> None:
+def _require_order(parts: Sequence[Log], starts: Sequence[float]) -> None:
     started = zip(parts, starts, strict=False)  # empty where starts are unknown
     for (part, start), (following, later) in pairwise(started):
         if later < start:
             right = sorted(range(len(parts)), key=lambda i: starts[i])
             names = ", ".join(f'"{parts[i].path.name}"' for i in right)
-            raise following.bad(
-                f"it started at {following.started}, earlier than {part.path.name}, which started at {part.started}; "
-                f"list the parts in this order: files = [{names}]"
-            )
+            why = f"earlier than {part.path.name}, which started at {part.started}"
+            remedy = f"list the parts in this order: files = [{names}]"
+            raise following.bad(f"it started at {following.started}, {why}; {remedy}")
 
 
 @dataclass
@@ -163,7 +158,7 @@ class _Axis:
     """The times of one clock over consecutive parts."""
 
     parts: Sequence[Log]
-    starts: Sequence[datetime]
+    starts: Sequence[float]  # [s] of the parts, from that of the first
     timeline: Timeline = field(default_factory=Timeline)  # of parts that count samples
     part: int = -1
     offset: float = 0.0  # [s] added to the times of the part
@@ -174,7 +169,7 @@ class _Axis:
         """Compute the times of the next samples of a part that counts them."""
         assert part.clock is not None
         new = number != self.part and bool(self.starts)  # without starts, a part follows the one before directly
-        self.timeline.add(0, self._since(number) + part.clock.start if new else None, part.clock.step)
+        self.timeline.add(0, self.starts[number] + part.clock.start if new else None, part.clock.step)
         t = self.timeline.times(self.timeline.rows, count)
         self.timeline.rows += count
         return self._checked(number, t)
@@ -184,21 +179,18 @@ class _Axis:
         if number != self.part and len(t):
             channel = part.find(name)
             goes_on = channel.kind == "number" and not channel.derived and t[0] > self.last_read
-            self.offset = self.offset if goes_on else 0.0 if t[0] > ABSOLUTE else self._since(number)
+            since = 0.0 if t[0] > ABSOLUTE or not self.starts else self.starts[number]
+            self.offset = self.offset if goes_on else since
         self.last_read = float(t[-1]) if len(t) else self.last_read
         return self._checked(number, t + self.offset)
-
-    def _since(self, number: int) -> float:
-        return (self.starts[number] - self.starts[0]).total_seconds() if self.starts else 0.0
 
     def _checked(self, number: int, t: Array) -> Array:
         if not len(t):
             return t
         if number != self.part and number and t[0] <= self.last:
             before, part = self.parts[number - 1].path.name, self.parts[number]
-            raise part.bad(
-                f"it begins at {t[0]:.9g} s of the log, but {before} ends at {self.last:.9g} s; the parts "
-                "overlap, so they belong to different recordings, or a clock was wrong: give them as separate logs"
-            )
+            overlap = f"it begins at {t[0]:.9g} s of the log, but {before} ends at {self.last:.9g} s; the parts overlap"
+            why = "so they belong to different recordings, or a clock was wrong: give them as separate logs"
+            raise part.bad(f"{overlap}, {why}")
         self.part, self.last = number, float(t[-1])
         return t
