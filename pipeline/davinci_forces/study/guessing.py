@@ -82,12 +82,11 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
     meanings |= {name: Meaning("dq", k, derivative) for k, name in enumerate(signals[n : 2 * n])}
     others = [values[start : start + n] for start in range(3 * n, len(values) - n + 1, n)]
     is_current = columns.is_current(values[2 * n : 3 * n], others, blocks.moving)
-    why_effort = "CHECK: follows the velocities; " + (
-        "current, as later columns are torques proportional to these columns"
-        if is_current else "effort, as nothing shows that it is a current"
-    )  # fmt: skip
-    effort = "i" if is_current else "tau"
-    meanings |= {name: Meaning(effort, k, why_effort) for k, name in enumerate(signals[2 * n : 3 * n])}
+    effort, why = "tau", "effort, as nothing shows that it is a current"
+    if is_current:
+        effort, why = "i", "current, as later columns are torques proportional to these columns"
+    reason = f"CHECK: follows the velocities; {why}"
+    meanings |= {name: Meaning(effort, k, reason) for k, name in enumerate(signals[2 * n : 3 * n])}
     return with_motion(log, Holding(meanings, n), samples, unnamed=True)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.logs.log import Channel, Log
+from davinci_forces.logs.log import Block, Channel, Log, concatenate, row_count
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.signals.clock import interruptions
@@ -52,15 +52,14 @@ class TimeGuess:
 
 def samples_of(log: Log, names: Sequence[str]) -> dict[str, Array]:
     """Read the first samples of channels of one clock, up to the last complete row; raises BadLog at damage."""
-    parts: dict[str, list[Array]] = {name: [] for name in names}
+    blocks: list[Block] = []
     rows = 0
     for block in log.blocks(list(names)):
-        for name in names:
-            parts[name].append(block[name])
-        rows += len(block[names[0]])
+        blocks.append(block)
+        rows += row_count(block)
         if rows >= MAX_SAMPLES:
             break
-    samples = {name: np.concatenate(part) if part else np.zeros(0) for name, part in parts.items()}
+    samples = concatenate(blocks or [{name: np.zeros(0) for name in names}])
     complete = np.flatnonzero(np.all([np.isfinite(values) for values in samples.values()], axis=0))
     return {name: values[: complete[-1] + 1 if len(complete) else 0] for name, values in samples.items()}
 

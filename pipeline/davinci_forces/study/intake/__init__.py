@@ -48,11 +48,10 @@ def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
     numbers = reading.to_si(block, "push")
     odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
     if len(odd):
-        raise reading.log.bad(
-            f"channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
-            f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push must be whole; name another "
-            "channel, or leave push out and the pushes are detected"
-        )
+        where = f"at row {reading.rows + int(odd[0])} (counted from 0)"
+        first = f"channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} {where}"
+        remedy = "name another channel, or leave push out and the pushes are detected"
+        raise reading.log.bad(f"{first}, but the number of a push must be whole; {remedy}")
     return numbers.astype(np.int64)
 
 
@@ -75,20 +74,17 @@ class Intake:
             for q, s in self.sources.items()
         }
         self.scales = {q: s.scale * self.unit(s, self.channels[q]) for q, s in self.sources.items()}
-        used = [channel.name for quantity, channel in self.channels.items() if quantity != "time"]
+        used = list(dict.fromkeys(channel.name for quantity, channel in self.channels.items() if quantity != "time"))
         positions = (f"{joint}.{symbol}" for joint in self.entry.joints for symbol in ("q", "theta_m"))
         reference = next((self.channels[q].name for q in positions if q in self.channels), used[0] if used else "")
-        self.clocks = UsedClocks(
-            self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
-        )
+        self.clocks = UsedClocks(self.log, self.entry, self.scales.get("time", 1.0), used, reference)
         if not self.clocks.all_timed and self.entry.needs_clock and not self.clocks.are_several:
             raise self.log.bad("the log has no clock; name its time channel in [log.channels], or give rate = ... [Hz]")
         has_seconds = self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)
         if not self.clocks.all_timed and has_seconds:
-            raise self.log.bad(
-                "the log has no clock, but skip, until and contact windows are in seconds; give "
-                'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
-            )
+            why = "the log has no clock, but skip, until and contact windows are in seconds"
+            remedy = 'give rate = ... [Hz], or leave them out; contact = "all" needs no clock'
+            raise self.log.bad(f"{why}; {remedy}")
         self.names = list(dict.fromkeys([*used, *([self.clocks.time] if self.clocks.time else [])]))
 
     def unit(self, source: Source, channel: Channel) -> float:
@@ -98,21 +94,18 @@ class Intake:
         misread = source.unit is not None and by_word and measures(log_unit) != source.measures  # `q_ma`: an average
         if misread or source.scale != 1.0:  # the stated unit is the unit after scaling
             log_unit = ""
+        fact = f"channel {channel.name!r} is in {channel.unit!r}"
         if source.unit and log_unit in UNITS and log_unit != source.unit:
-            raise self.log.bad(
-                f"channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
-                f"{source.unit!r}; correct the unit of {source.quantity} in study.toml, or leave it out"
-            )
+            remedy = f"correct the unit of {source.quantity} in study.toml, or leave it out"
+            raise self.log.bad(f"{fact}, but study.toml says {source.unit!r}; {remedy}")
         unit = source.unit or log_unit or SI[source.measures]
         if source.measures == "count":
             return 1.0
         if measures(unit) != source.measures:
             what = f"measures {measures(unit)}" if unit in UNITS else "is an unknown unit"
             fitting = ", ".join(u for u in UNITS if measures(u) == source.measures)
-            raise self.log.bad(
-                f"channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
-                f"{source.quantity} needs {source.measures}; give its unit in study.toml, one of {fitting}"
-            )
+            need = f"{source.quantity} needs {source.measures}; give its unit in study.toml, one of {fitting}"
+            raise self.log.bad(f"{fact}, which {what}, but {need}")
         return size(unit)
 
     def positions(self, block: Block) -> Column:
@@ -127,14 +120,13 @@ class Intake:
             return
         for name in (name for name in self.names if name in block):
             self.require_numbers(name, block[name])
-        t = self.times(block)
+        t = self.clocks.times(block, self.rows)
         self.clock.update(t, [block[c.name] for q, c in self.channels.items() if q != "time"])
         if self.clock.backward or self.clock.repeated:
             before, after = self.clock.bad_pair
-            raise self.log.bad(
-                f"time does not increase at row {self.clock.bad_row} (counted from 0): {before:.9g} s, then "
-                f"{after:.9g} s; name another time channel, or give rate = ... [Hz] to count samples instead"
-            )
+            where = f"at row {self.clock.bad_row} (counted from 0): {before:.9g} s, then {after:.9g} s"
+            remedy = "name another time channel, or give rate = ... [Hz] to count samples instead"
+            raise self.log.bad(f"time does not increase {where}; {remedy}")
         first = self.clock.first
         selected = t - first >= self.entry.skip - 1e-9
         for name in self.entry.joints:
@@ -156,16 +148,12 @@ class Intake:
         """A block without the rows after the study's `until`, whatever they hold."""
         if self.entry.until is None or not row_count(block):
             return block
-        t = self.times(block)
+        t = self.clocks.times(block, self.rows)
         after = np.flatnonzero(t - (self.clock.first if self.rows else t[0]) > self.entry.until + 1e-9)
         if not len(after):
             return block
         self.ended = True
         return {name: values[: int(after[0])] for name, values in block.items()}
-
-    def times(self, block: Block) -> Column:
-        """Time of each row of the next block [s], or its number where there is no clock."""
-        return self.clocks.times(block, self.rows)
 
     def to_si(self, block: Block, quantity: str) -> Column:
         """Convert a channel to SI: offset first, in the channel's unit, then sign, scale and unit."""
@@ -191,12 +179,10 @@ class Intake:
         bad = np.flatnonzero(~(np.abs(values) < MAX_VALUE))
         if not len(bad):
             return
-        row = self.rows + int(bad[0])
-        raise self.log.bad(
-            f"channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
-            f"of the {len(values)} rows read with it lack a number; record the log again, or save the part before this "
-            "row as a separate log"
-        )
+        first = f"holds {values[bad[0]]} at row {self.rows + int(bad[0])} (counted from 0)"
+        share = f"{len(bad)} of the {len(values)} rows read with it lack a number"
+        remedy = "record the log again, or save the part before this row as a separate log"
+        raise self.log.bad(f"channel {name!r} {first}, and {share}; {remedy}")
 
 
 def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
@@ -219,10 +205,10 @@ def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Blo
     for block in blocks:
         late = block | {name: block[name] - passed} if passed else block
         joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
-        for i, jump in steps(intake.times(joined), intake.positions(joined)):
+        for i, jump in steps(intake.clocks.times(joined, intake.rows), intake.positions(joined)):
             joined = joined | {name: joined[name] - np.where(np.arange(len(joined[name])) < i, 0.0, jump / scale)}
             passed += jump / scale
-            intake.jumps.append((float(intake.times(joined)[i - 1]), jump))
+            intake.jumps.append((float(intake.clocks.times(joined, intake.rows)[i - 1]), jump))
         ready = max(len(joined[name]) - HISTORY, 0)
         waiting = {key: values[ready:] for key, values in joined.items()}
         yield {key: values[:ready] for key, values in joined.items()}

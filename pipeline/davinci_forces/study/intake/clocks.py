@@ -45,20 +45,17 @@ class UsedClocks:
         self.time_source = next((source for source in self.entry.channels if source.quantity == "time"), None)
         groups = [part for time, names in self.log.by_clock(self.used).items() for part in self._split(time, names)]
         if self.time_source and not any(group.is_stated for group in groups):
-            raise self.log.bad(
-                f"time = {self.time_source.channel!r} is not the clock of any channel that is used; "
-                "the log has a clock for these, so leave time out of [log.channels]"
-            )
+            why = f"time = {self.time_source.channel!r} is not the clock of any channel that is used"
+            raise self.log.bad(f"{why}; the log has a clock for these, so leave time out of [log.channels]")
         self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
         self.missing.until = np.inf if self.entry.until is None else self.entry.until
         lent = self.log.lent  # the clock of a channel that is not used is not that of those that are
         for group in () if self.entry.rate else self.groups:
             names = [self.log.find(name).name for name in group.names]
             if not group.is_stated and all(name in lent and lent[name] not in names for name in names):
-                raise self.log.bad(
-                    f"the log states no sampling time of channel {names[0]!r}, only of "
-                    f"{lent[names[0]]!r}, which is not used; give rate = ... [Hz], or name its time in [log.channels]"
-                )
+                lender = f"only of {lent[names[0]]!r}, which is not used"
+                remedy = "give rate = ... [Hz], or name its time in [log.channels]"
+                raise self.log.bad(f"the log states no sampling time of channel {names[0]!r}, {lender}; {remedy}")
 
     @property
     def are_several(self) -> bool:
@@ -112,10 +109,9 @@ class UsedClocks:
                 return
         if not self.all_timed:
             without = next(group for group in self.groups if not self._is_known(group))
-            raise self.log.bad(
-                f"channel {without.names[0]!r} has no clock, but other channels that are used have "
-                "clocks; name its time in [log.channels], give rate = ... [Hz] for all channels, or leave it out"
-            )
+            why = f"channel {without.names[0]!r} has no clock, but other channels that are used have clocks"
+            remedy = "name its time in [log.channels], give rate = ... [Hz] for all channels, or leave it out"
+            raise self.log.bad(f"{why}; {remedy}")
         logs = [self.log.independent_copy() for _ in self.groups]
         timed = (self._timed(log, group) for log, group in zip(logs, self.groups, strict=True))
         first, *others = (self._filled(blocks, group) for blocks, group in zip(timed, self.groups, strict=True))
@@ -173,10 +169,8 @@ class UsedClocks:
             unit = since_1970(size) if MAX_SECONDS < size < np.inf else "s"
             stated = self.log.find(name).unit or (self.time_source.unit if self.time_source else "")
             if not unit or (unit != "s" and stated):
-                raise self.log.bad(
-                    f"channel {name!r} holds times of {size:.4g} s, which is no date; correct the "
-                    "unit of time in study.toml, or name another time channel"
-                )
+                why = f"channel {name!r} holds times of {size:.4g} s, which is no date"
+                raise self.log.bad(f"{why}; correct the unit of time in study.toml, or name another time channel")
             self.units[name] = size_of(unit)
         return self.units.get(name, 1.0)
 
@@ -189,15 +183,11 @@ class UsedClocks:
         if not done.clocks_differ:
             return
         how = "; ".join(_how(follower_name, follower) for follower_name, follower in done.others.items())
-        yield (
-            f"{name}: channels with different clocks were resampled on the clock of {_listed(self.groups[0].names)} "
-            f"({1 / done.period:.6g} Hz): {how}"
-        )
+        clock = f"the clock of {_listed(self.groups[0].names)} ({1 / done.period:.6g} Hz)"
+        yield f"{name}: channels with different clocks were resampled on {clock}: {how}"
         if done.left_out:
-            yield (
-                f"{name}: {done.left_out} of {done.kept + done.left_out} rows are left out, because another clock has "
-                "no samples near enough on both sides"
-            )
+            rows = f"{done.left_out} of {done.kept + done.left_out} rows are left out"
+            yield f"{name}: {rows}, because another clock has no samples near enough on both sides"
 
 
 def _how(name: str, follower: Follower) -> str:

@@ -97,8 +97,7 @@ class MissingSamples:
             end = channel.at_end if log.cut else 0
             if channel.count - end > MAX_MISSING * (channel.rows - end):
                 what = "has no sample" if log.nulls.get(name, 0) else "holds nan"
-                raise log.bad(
-                    f"channel {name!r} {what} at row {channel.first} (counted from 0), and {channel.count} "
-                    f"of its {channel.rows} rows lack a number, more than {MAX_MISSING:.0%}, in no regular rhythm; "
-                    "record the log again, or leave the channel out"
-                )
+                first = f"channel {name!r} {what} at row {channel.first} (counted from 0)"
+                share = f"{channel.count} of its {channel.rows} rows lack a number, more than {MAX_MISSING:.0%}"
+                remedy = "record the log again, or leave the channel out"
+                raise log.bad(f"{first}, and {share}, in no regular rhythm; {remedy}")

@@ -21,11 +21,8 @@ def summary(intake: Intake) -> LogSummary:
         until = f" and those after {entry.until:g} s left out" if intake.ended else ""
         why = f"{clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
         raise log.bad(f"{why}; record more, or take the log out of study.toml")
-    feeds: dict[str, dict[str, None]] = {}  # channel -> its quantities, in order
-    for quantity, channel in intake.channels.items():
-        feeds.setdefault(channel.name, {})[quantity] = None
-    for name in filter(None, (group.time for group in intake.clocks.groups)):
-        feeds.setdefault(name, {})["time"] = None
+    feeds = [(c.name, quantity) for quantity, c in intake.channels.items()]  # channels, and quantities that they feed
+    feeds += [(group.time, "time") for group in intake.clocks.groups]
     names = [channel.name for channel in log.channels]
     facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
     times = (clock.rate, clock.last - clock.first, clock.jitter, clock.longest_gap)
@@ -39,7 +36,7 @@ def summary(intake: Intake) -> LogSummary:
         warnings=tuple(map(visible, log.warnings)),
         channel=np.array([*map(visible, names)], object),
         unit=np.array([visible(channel.unit) for channel in log.channels], object),
-        feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
+        feeds=np.array([", ".join(dict.fromkeys(q for c, q in feeds if c == name)) for name in names], object),
         nulls=np.array([log.nulls.get(name, 0) for name in names]),
         nans=np.array([log.nans.get(name, 0) for name in names]),
     )  # fmt: skip
@@ -48,32 +45,27 @@ def summary(intake: Intake) -> LogSummary:
 def remarks(intake: Intake) -> Iterator[str]:
     """Remarks for a reviewer on the clock and the rows."""
     clock, entry = intake.clock, intake.entry
+    duration = clock.last - clock.first
     if intake.jumps:
         when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in intake.jumps[:5])
-        more = " ..." if len(intake.jumps) > 5 else ""
-        yield (
-            f"the clock jumps while the motion continues, by {when}{more}. The later times are moved by the jump; "
-            "find out why the recorder's clock jumps"
-        )
+        jumps = f"by {when} ..." if len(intake.jumps) > 5 else f"by {when}"
+        remedy = "The later times are moved by the jump; find out why the recorder's clock jumps"
+        yield f"the clock jumps while the motion continues, {jumps}. {remedy}"
     for start, end in entry.contact:
-        if start >= clock.last - clock.first or end <= entry.skip:
-            yield (
-                f"the contact window {start:g} to {end:g} s lies outside the log, which goes from {entry.skip:g} to "
-                f"{clock.last - clock.first:g} s; contact times count from the log's first sample"
-            )
-    if entry.until is not None and not intake.ended and clock.last - clock.first < entry.until - GAP / clock.rate:
-        yield (
-            f"until = {entry.until:g} s leaves nothing out, because the log ends after "
-            f"{clock.last - clock.first:g} s; both count from its first sample"
-        )
+        if start >= duration or end <= entry.skip:
+            span = f"the log, which goes from {entry.skip:g} to {duration:g} s"
+            window = f"the contact window {start:g} to {end:g} s"
+            yield f"{window} lies outside {span}; contact times count from the log's first sample"
+    if entry.until is not None and not intake.ended and duration < entry.until - GAP / clock.rate:
+        why = f"because the log ends after {duration:g} s; both count from its first sample"
+        yield f"until = {entry.until:g} s leaves nothing out, {why}"
     missing = intake.clocks.missing
     left_out = missing.left_out.count
     if end := missing.left_out.at_end if intake.log.cut else 0:
         yield f"the file is truncated: its last {end} rows lack some channels and are left out"
     if missing.filled_rows or left_out > end:
         lacking = ", ".join(f"{name!r} {c.count}" for name, c in missing.channels.items() if c.count > c.at_end)
-        yield (
-            f"samples are missing ({lacking}): {missing.filled_rows} rows with up to {1e3 * FILLED:g} ms or one sample "
-            f"missing are filled by cubics, and neither fitted nor judged; {left_out - end} rows are gaps"
-        )
+        runs = f"rows with up to {1e3 * FILLED:g} ms or one sample missing"
+        rows = f"{missing.filled_rows} {runs} are filled by cubics, and neither fitted nor judged"
+        yield f"samples are missing ({lacking}): {rows}; {left_out - end} rows are gaps"
     yield from clocks.remarks(clock, clock.rate)
