@@ -87,9 +87,7 @@ class ArrayLog(Log):
 def take_in(log: ArrayLog, arrays: Sequence[NamedArray]) -> None:
     """Make the columns of recordings the channels of a log, and list all other arrays as facts."""
     recordings = [array for array in arrays if array.is_recording]
-    for array in arrays:
-        if not array.is_recording:
-            log.facts[array.name] = _shown(array)
+    log.facts |= {array.name: _shown(array) for array in arrays if not array.is_recording}
     if len(log.facts) > MAX_FACTS:
         more = len(log.facts) - MAX_FACTS
         log.facts = dict(list(log.facts.items())[:MAX_FACTS]) | {"...": f"{more} more that are not recordings"}
@@ -113,9 +111,8 @@ def take_in(log: ArrayLog, arrays: Sequence[NamedArray]) -> None:
 def matlab_object(name: str, kind: str = "") -> str:
     """Describe a MATLAB object that cannot be read, with the MATLAB code that saves a timeseries as a struct."""
     path, variable = name.replace("/", "."), re.sub(r"\W+", "_", name).strip("_")
-    line = (
-        f"{variable} = struct('Time', {path}.Time, 'Data', squeeze({path}.Data)); save('{variable}.mat', '{variable}')"
-    )
+    struct = f"struct('Time', {path}.Time, 'Data', squeeze({path}.Data))"
+    line = f"{variable} = {struct}; save('{variable}.mat', '{variable}')"
     what = f"{name} is a MATLAB object{f' ({kind})' if kind else ''}, which only MATLAB reads"
     if kind not in ("", "timeseries"):
         return f"{what}: save its numbers as separate variables"

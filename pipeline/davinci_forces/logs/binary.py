@@ -38,10 +38,9 @@ def read(path: Path, options: Options) -> Log:
     """Open the file; raises BadLog if the study does not state its layout, or the file cannot have it."""
     dtype = dtype_of(options.dtype or "")
     if dtype is None or not options.columns:
-        raise BadLog(
-            f"{path}: raw binary files do not say what they hold; describe it in [[log]] of study.toml: "
-            f'{BINARY_EXAMPLE} (big-endian, as LabVIEW writes; "<float64" is little-endian)'
-        )
+        remedy = f"describe it in [[log]] of study.toml: {BINARY_EXAMPLE}"
+        order = '(big-endian, as LabVIEW writes; "<float64" is little-endian)'
+        raise BadLog(f"{path}: raw binary files do not say what they hold; {remedy} {order}")
     count = options.columns if isinstance(options.columns, int) else len(options.columns)
     names = [f"column_{i}" for i in range(count)] if isinstance(options.columns, int) else options.columns
     pieces, layout, lost = _pieces(path, dtype, count)
@@ -90,10 +89,9 @@ def _pieces(path: Path, dtype: np.dtype[np.generic], columns: int) -> tuple[Piec
         sized, end = _sized(file, size, dtype, columns)
     if sized and (end == size or (columns > 1 and dtype.kind == "f")):
         if end < size:
-            raise BadLog(
-                f"{path}: after {len(sized)} arrays of {columns} columns, each with its size before it, byte {end} "
-                f"begins an array without {columns} columns; correct `columns` in study.toml, or record it again"
-            )
+            arrays = f"{len(sized)} arrays of {columns} columns, each with its size before it"
+            remedy = "correct `columns` in study.toml, or record it again"
+            raise BadLog(f"{path}: after {arrays}, byte {end} begins an array without {columns} columns; {remedy}")
         position, rows = sized[-1]
         whole = min(rows, (size - position) // row)
         lost = (size - position) % row if whole < rows else 0

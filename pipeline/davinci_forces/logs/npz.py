@@ -51,10 +51,9 @@ def _arrays(path: Path, member: str, log: Log) -> Iterator[NamedArray]:
     with _opened(path, member) as file:
         shape, by_column, dtype = _header(file)
     if dtype.hasobject:
-        log.warnings.append(
-            f"{name} holds Python objects, which could run any code when they are loaded, and is left out; save its "
-            "numbers as arrays of their own: numpy.savez(file, t=..., q=...)"
-        )
+        why = "which could run any code when they are loaded, and is left out"
+        remedy = "save its numbers as arrays of their own: numpy.savez(file, t=..., q=...)"
+        log.warnings.append(f"{name} holds Python objects, {why}; {remedy}")
     elif dtype.names:
         for part in dtype.names:
             if not dtype[part].shape and not dtype[part].names:

@@ -13,7 +13,5 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Log:
     """Refuse the file by a BadLog, which says how to convert it to TDMS."""
-    raise BadLog(
-        f"{path}: TDM files (.tdm, with their numbers in a .tdx) are not read; save it as TDMS, with DIAdem or with "
-        "LabVIEW's Convert to TDMS, and name that file in study.toml"
-    )
+    remedy = "save it as TDMS, with DIAdem or with LabVIEW's Convert to TDMS, and name that file in study.toml"
+    raise BadLog(f"{path}: TDM files (.tdm, with their numbers in a .tdx) are not read; {remedy}")

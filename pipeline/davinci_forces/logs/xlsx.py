@@ -56,8 +56,7 @@ def open_in_child(path: Path) -> Log:
     log.facts["sheet"] = title
     if more := [other for other in tables if other != title]:
         log.warnings.append(f"the sheets {', '.join(more)} are left out: the longest, {title!r}, is read")
-    stamp = next((value for value in first if isinstance(value, datetime)), None)
-    if stamp:
+    if stamp := next((value for value in first if isinstance(value, datetime)), None):
         log.origin = stamp.replace(microsecond=0)
         log.started, log.zone = log.origin.isoformat(), "local"
         log.time = next(channel.name for channel in log.channels if channel.kind == "time")
@@ -127,7 +126,5 @@ class SheetLog(Log):
             return float(cell)
         except (TypeError, ValueError):
             text = f"{cell}"[:40]
-            raise self.bad(
-                f"sheet {self.sheet!r}, row {row + 1}, column {name!r}: {text!r} is not a number; "
-                "correct the cell, or empty it"
-            ) from None
+            where = f"sheet {self.sheet!r}, row {row + 1}, column {name!r}"
+            raise self.bad(f"{where}: {text!r} is not a number; correct the cell, or empty it") from None

@@ -40,8 +40,7 @@ def read(path: Path, options: Options, reader: str, package: str = "") -> Log:
         "seconds": SECONDS + size / BYTES_PER_SECOND, "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
         "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
     }  # fmt: skip
-    for message, _ in _answers(path, request):
-        state = message
+    [(state, _)] = _answers(path, request)
     return IsolatedLog(path, request=request, **state)
 
 

@@ -191,9 +191,8 @@ def _answer(request: Message, answers: IO[bytes]) -> None:
             return
         for block in log.blocks(names):
             send(answers, {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names])
-        send(
-            answers, {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}
-        )
+        end = {name: getattr(log, name) for name in FINAL_FIELDS}
+        send(answers, {"end": end, "nulls": log.nulls, "nans": log.nans})
     except BrokenPipeError:
         raise
     except BadLog as error:
@@ -201,11 +200,9 @@ def _answer(request: Message, answers: IO[bytes]) -> None:
     except MemoryError:
         _opened.clear()
         most = request["memory"] >> 20
-        bad = (
-            f"{request['path']}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one "
-            "piece: save it in a format that is read piece by piece, such as MATLAB's -v7.3"
-        )
-        send(answers, {"bad": bad})
+        what = f"reading it takes more than {most} MB of memory; it is damaged, or holds much in one piece"
+        remedy = "save it in a format that is read piece by piece, such as MATLAB's -v7.3"
+        send(answers, {"bad": f"{request['path']}: {what}: {remedy}"})
     except Exception as error:
         _opened.clear()
         send(answers, {"bad": f"{request['path']}: it cannot be read ({type(error).__name__}: {error}): {REMEDY}"})

@@ -93,7 +93,6 @@ def _rounded(layout: Layout) -> str:
     whole_rate = step > 0 and abs(1 / step - round(1 / step)) < 1e-6 / step
     if not fixed or whole_rate or step <= 0 or STEP_ROUNDING / step < MIN_CLOCK_ERROR:
         return ""
-    return (
-        f"line {layout.line}: the sampling interval of {layout.step_written} s is rounded, so the clock may be "
-        f"wrong by {STEP_ROUNDING / step:.2%}; set rate = ... [Hz] for this log in study.toml"
-    )
+    doubt = f"is rounded, so the clock may be wrong by {STEP_ROUNDING / step:.2%}"
+    remedy = "set rate = ... [Hz] for this log in study.toml"
+    return f"line {layout.line}: the sampling interval of {layout.step_written} s {doubt}; {remedy}"

@@ -75,9 +75,8 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
     in_first_line = lines[0][len(MAGIC) : len(MAGIC) + 1].strip(b" ") or b"\t"
     separator = {b"Tab": b"\t", b"Comma": b","}.get(tag[2].strip(), tag[1]) if tag else in_first_line
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
-        raise BadContent(
-            f"the separator is {decode(separator, encoding)!r}, which cannot separate numbers; export with tabs"
-        )
+        mark = decode(separator, encoding)
+        raise BadContent(f"the separator is {mark!r}, which cannot separate numbers; export with tabs")
     cells = [decode(line, encoding).split(separator.decode()) for line in lines[1:]]
     tags = {row[0].strip(): row[1].strip() for row in cells if len(row) > 1 and row[0].strip() not in ("", "Separator")}
     decimal = tags.get("Decimal_Separator", "")

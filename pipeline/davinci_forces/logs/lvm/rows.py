@@ -93,10 +93,9 @@ class Reading:
         except NotANumber as bad:
             text = decode(bad.cell)
             shown = repr(text if len(text) <= 40 else f"{text[:37]}...")
-            raise BadLog(
-                f"{self.log.path}:{run.line(bad.row)}: {shown} in column {bad.column} ({run.name(bad.column) or 'x'}) "
-                "is not a number; correct the cell, or take the row out of the log"
-            ) from None
+            where = f"{shown} in column {bad.column} ({run.name(bad.column) or 'x'})"
+            what = "is not a number; correct the cell, or take the row out of the log"
+            raise BadLog(f"{self.log.path}:{run.line(bad.row)}: {where} {what}") from None
 
     def _columns_of(self, run: Run, channels: Sequence[str]) -> dict[int, str]:
         names = ((i, run.name(i)) for i in range(run.width - run.commented))
@@ -145,10 +144,8 @@ class Reading:
         stated, written = run.layout.file.decimal, decode(marks(run.block, run.layout.file.separator))
         if not self.marked and not run.commented and (len(written) > 1 or (stated and written and written != stated)):
             self.marked = True
-            self.say(
-                f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, but cells use "
-                f"{' and '.join(map(repr, written))}; each cell is read with its own"
-            )
+            usage = f"but cells use {' and '.join(map(repr, written))}; each cell is read with its own"
+            self.say(f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, {usage}")
 
     def _look_back(self, run: Run, x: Array | None) -> None:
         """Count the rows where x does not increase, but for those behind a header or a blank line."""

@@ -205,7 +205,6 @@ class BagLog(Log):
         if place := layout.numbers.get(quantity):
             return numbers_at(place, table)
         joint = topic.first.numbers[quantity].joint
-        raise self.bad(
-            f"message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
-            "the first message has; record these separately"
-        )
+        what = f"{quantity} ({joint})" if joint else quantity
+        why = f"has no {what}, which the first message has; record these separately"
+        raise self.bad(f"message {number} of {topic.name} {why}")

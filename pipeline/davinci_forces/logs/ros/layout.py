@@ -202,9 +202,8 @@ class _Walk:
         return range(at, at + size)
 
     def layout(self, kind: str, first: Layout | None) -> Layout:
-        layout = Layout(
-            names=self.names, stamp=self.stamp, fixed=np.array([at for places in self.fixed for at in places], np.intp)
-        )
+        fixed = np.array([at for places in self.fixed for at in places], np.intp)
+        layout = Layout(names=self.names, stamp=self.stamp, fixed=fixed)
         for path, length, place in self.lists:
             if length is None:
                 layout.numbers[path] = place

@@ -110,10 +110,9 @@ class Scan:
             self.cut = True
             times = [t for places in self.places.values() for t in places[::4]]
             span = (max(times) - min(times)) / 1e9 if times else 0.0
-            self.warnings.append(
-                f"{self.path.name} is cut, or its recorder did not close it: {len(times)} messages over {span:.3f} s "
-                f"are whole and are read, up to byte {self.at} of {len(content)}"
-            )
+            messages = f"{len(times)} messages over {span:.3f} s are whole and are read"
+            end = f"up to byte {self.at} of {len(content)}"
+            self.warnings.append(f"{self.path.name} is cut, or its recorder did not close it: {messages}, {end}")
         else:
             self.compare()
         self.connections = [c._replace(msgcount=len(self.places[c.id]) // 4) for c in self.connections]
@@ -133,10 +132,8 @@ class Scan:
     def require_count(self, where: str, topic: str, stated: int, count: int) -> None:
         """Require that as many messages are there as the file states."""
         if stated != count:
-            raise BadLog(
-                f"{self.path}: {where} counts {stated} messages of {topic}, but {count} are there; the bag is damaged: "
-                "record it again"
-            )
+            counts = f"{where} counts {stated} messages of {topic}, but {count} are there"
+            raise BadLog(f"{self.path}: {counts}; the bag is damaged: record it again")
 
     def add(self, connection: Any) -> None:
         """Add a connection, unless it is there: bags repeat them."""

@@ -55,9 +55,8 @@ class Database:
             raise BadLog(f"{self.path}: this bag cannot be read ({error}); record it again") from None
         journal = self.path.with_name(f"{self.path.name}-wal")
         if journal.is_file() and journal.stat().st_size:
-            self.warnings.append(
-                f"messages in {journal.name} are not read; open the bag with sqlite3 once to move them"
-            )
+            remedy = "open the bag with sqlite3 once to move them"
+            self.warnings.append(f"messages in {journal.name} are not read; {remedy}")
 
     def _whole_rows(self) -> sqlite3.Connection | None:
         """Copy the rows of a database that lacks pages; SQLite would refuse it, or take the missing bytes for zeros."""
@@ -80,10 +79,8 @@ class Database:
                         whole.execute(f"INSERT INTO {name} VALUES ({','.join('?' * len(row))})", row)
         self.cut = True
         [(count, span)] = whole.execute("SELECT count(*), (max(timestamp) - min(timestamp)) / 1e9 FROM messages")
-        self.warnings.append(
-            f"{self.path.name} is cut: {there} of its {pages} pages are there; {count} messages over {span or 0:.3f} s "
-            "are whole and are read"
-        )
+        messages = f"{count} messages over {span or 0:.3f} s are whole and are read"
+        self.warnings.append(f"{self.path.name} is cut: {there} of its {pages} pages are there; {messages}")
         return whole
 
     def _listed(self) -> Iterator[Any]:

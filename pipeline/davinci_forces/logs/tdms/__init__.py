@@ -157,10 +157,9 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
         # The first property that changes the meaning of samples: a unit or a scale.
         word = next((word for word in first if word.lower() in UNIT_PROPERTIES or word.startswith("NI_Scal")), "")
         if word and path in latest:
-            log.unread[log.names[path]] = (
-                f"channel {log.names[path]!r} has {word} = {first[word]!r} first and {properties[path][word]!r} in a "
-                "later file segment, so its samples mean two things; split the file, or record it again"
-            )
+            change = f"{word} = {first[word]!r} first and {properties[path][word]!r} in a later file segment"
+            remedy = "so its samples mean two things; split the file, or record it again"
+            log.unread[log.names[path]] = f"channel {log.names[path]!r} has {change}, {remedy}"
     sizes = {log.names[path]: sum(rows for rows, _ in waveforms.writes.get(path, ())) for path in latest}
     _describe_time(log, waveforms, properties, sizes)
     if len(set(sizes.values())) > 1:
@@ -189,9 +188,8 @@ def _describe_time(
     for name, timeline in log.made.items():
         if gaps := [f"{first}" for first in timeline.first[1:]]:
             some = ", ".join(gaps[:5]) + (" ..." if len(gaps) > 5 else "")
-            log.warnings.append(
-                f"later writes give another start or sampling interval: {name!r} begins anew at sample {some}"
-            )
+            restart = f"{name!r} begins anew at sample {some}"
+            log.warnings.append(f"later writes give another start or sampling interval: {restart}")
 
 
 def _first_second(file: BinaryIO, index: Index, path: str) -> int | None:

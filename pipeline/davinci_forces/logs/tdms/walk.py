@@ -16,7 +16,7 @@ from davinci_forces.logs.tdms.metadata import DAQMX_RAW, NUMBER_CODES, SIZES, ST
 
 TAG = b"TDSm"
 LEAD_IN = 28  # [bytes]
-HAS_METADATA, HAS_NEW_LIST, HAS_RAW, IS_INTERLEAVED, IS_BIG_ENDIAN, HAS_DAQMX = 2, 4, 8, 32, 64, 128
+HAS_METADATA, HAS_NEW_LIST, HAS_RAW, IS_INTERLEAVED, IS_BIG_ENDIAN = 2, 4, 8, 32, 64
 VERSIONS = [struct.pack(order + "I", version) for order in "<>" for version in (4712, 4713)]
 UNKNOWN = 2**64 - 1  # length of a file segment that LabVIEW did not finish
 SMALL_SEGMENT = 1 << 14  # [bytes] of a file segment that is compared in blocks
@@ -80,10 +80,8 @@ class Walk:
                 more = self._alike(lead + metadata, end, LEAD_IN + length) if whole else 0
                 yield from self._within(toc, order, data, end, more, LEAD_IN + length, whole)
             except BadContent as problem:
-                self.say(
-                    f"byte {at}: the file segment that begins here is damaged: {problem}; neither it nor the data "
-                    "after it is read"
-                )
+                what = f"the file segment that begins here is damaged: {problem}"
+                self.say(f"byte {at}: {what}; neither it nor the data after it is read")
                 return None
             self.file_segments += 1 + more
             at = self.end = end + more * (LEAD_IN + length)

@@ -153,10 +153,9 @@ class _Reading:
         try:
             return self.times[column](pa.chunked_array([[None if c in ABSENT else c for c in cells]], pa.string()))
         except UNREADABLE as bad:
-            raise BadLog(
-                f"{self.log.path}:{lines[0]}: from this line on there is a time that is not a valid date ({bad}); "
-                "correct the cell, or take the row out of the log"
-            ) from None
+            what = f"from this line on there is a time that is not a valid date ({bad})"
+            remedy = "correct the cell, or take the row out of the log"
+            raise BadLog(f"{self.log.path}:{lines[0]}: {what}; {remedy}") from None
 
     def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
         """Whether a line holds samples, and no remark or the header again; raises BadLog at another header."""
@@ -171,10 +170,9 @@ class _Reading:
         elif len(cells) < self.width:
             self._comment(line, text)
         elif self.width > 1:
-            raise BadLog(
-                f"{self.log.path}:{line}: {text[:80]!r} is neither a row nor the header; if another table begins here, "
-                "save each as a file of its own, else take the line out of the log"
-            )
+            what = f"{text[:80]!r} is neither a row nor the header"
+            remedy = "if another table begins here, save each as a file of its own, else take the line out of the log"
+            raise BadLog(f"{self.log.path}:{line}: {what}; {remedy}")
         return self.width == 1 and text not in self.dialect.header_lines
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:

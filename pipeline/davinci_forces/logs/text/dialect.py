@@ -224,10 +224,9 @@ def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimite
     of_names = next(distinct, above[-1] if above else None)  # a row of types repeats itself
     names = [] if of_names is None else rows[of_names]
     if any(COUNTING.fullmatch(cell) for cell in names) and options.header is None:
-        raise BadContent(
-            f"a line before the rows holds numbers and text ({', '.join(names[:6])}); correct the cell, or set "
-            "`header = true` for this log in study.toml if these are names"
-        )
+        what = f"a line before the rows holds numbers and text ({', '.join(names[:6])})"
+        remedy = "correct the cell, or set `header = true` for this log in study.toml if these are names"
+        raise BadContent(f"{what}; {remedy}")
     units = [cell.strip("[](){} ") for cell in rows[of_units]] if of_units is not None else [""] * width
     cells_above = zip(units, *(rows[i] for i in above[::-1]), strict=True) if above else ()
     units = [unit or next(filter(None, map(unit_in, cells)), "") for unit, *cells in cells_above] or units
@@ -266,12 +265,8 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def _other_columns(cells: Sequence[str], width: int) -> str:
-    short = (
-        "which one has no name is not known, the first, as a number of the row, or another: name all (in R by "
-        "write.csv(..., row.names = FALSE), in pandas by to_csv(index=False))"
-    )
-    remedy = short if len(cells) == width - 1 else "correct it"
-    return (
-        f"the header names {len(cells)} columns ({', '.join(cells[:6])}), but rows have {width}; {remedy}, "
-        "or set `header = false` for this log in study.toml"
-    )
+    doubt = "which one has no name is not known, the first, as a number of the row, or another"
+    names = "name all (in R by write.csv(..., row.names = FALSE), in pandas by to_csv(index=False))"
+    remedy = f"{doubt}: {names}" if len(cells) == width - 1 else "correct it"
+    counts = f"the header names {len(cells)} columns ({', '.join(cells[:6])}), but rows have {width}"
+    return f"{counts}; {remedy}, or set `header = false` for this log in study.toml"

@@ -59,10 +59,9 @@ def both_readings(cell: str) -> str:
     if not any(readings.fullmatch(cell) for readings in TWO_READINGS.values()):
         return ""
     digits = re.sub("[.,]", "", cell)
-    return (
-        f"may be {digits} with a thousands separator, or {digits[:-3]}.{digits[-3:]}; export it without thousands "
-        "separators, or set `decimal` for this log in study.toml"
-    )
+    readings = f"{digits} with a thousands separator, or {digits[:-3]}.{digits[-3:]}"
+    remedy = "export it without thousands separators, or set `decimal` for this log in study.toml"
+    return f"may be {readings}; {remedy}"
 
 
 def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tuple[str, str]:
@@ -79,10 +78,9 @@ def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tu
     if not scores or 2 * scores[best][0] < len(body):
         start = rows[0].lstrip()
         hint = next((f"; {hint}" for mark, hint in EXPORTS.items() if start.startswith(mark)), "")
-        raise BadContent(
-            "no delimiter (tab, semicolon, comma, pipe, blanks) splits its lines into columns of numbers; set "
-            f"`delimiter` and `decimal` for this log in study.toml, or take it out{hint}"
-        )
+        what = "no delimiter (tab, semicolon, comma, pipe, blanks) splits its lines into columns of numbers"
+        remedy = "set `delimiter` and `decimal` for this log in study.toml, or take it out"
+        raise BadContent(f"{what}; {remedy}{hint}")
     if best == (",", ".") and not options.delimiter and not options.decimal:
         if scores["\t", "."][:2] == scores[best][:2]:
             raise BadContent(COMMA.format("or separate thousands"))  # for whole lines are numbers as well
@@ -127,11 +125,8 @@ def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:
     widths = {len([cell for cell in row if cell]) for row in cells}
     fractions = [cell for row in cells for cell in row[1::2] if cell]
     pairs = all(width % 2 == 0 for width in widths) and all(cell[0].isdecimal() for cell in fractions)
-    uneven = (
-        len(widths) > 1
-        or len({len(cell) for cell in fractions}) == 1
-        or any(len(c) > 1 and c[0] == "0" for c in fractions)
-    )
+    lengths = {len(cell) for cell in fractions}
+    uneven = len(widths) > 1 or len(lengths) == 1 or any(len(c) > 1 and c[0] == "0" for c in fractions)
     spaced = all(re.search(r",\s", line) and re.search(r",\S", line) for line in body)
     if widths == {2} or (pairs and (uneven or spaced or 2 * len(first) == len(cells[-1]))):
         raise BadContent(COMMA.format("the decimal mark, or both"))

@@ -114,10 +114,8 @@ def both_dates(cells: Sequence[str]) -> str:
     if not dates or _orders(cells):
         return ""
     first, second = re.split("[/-]", dates[0])[:2]
-    return (
-        f"holds {dates[0]!r}, which may be day {first} of month {second}, or day {second} of month {first}; export "
-        "dates as in ISO 8601, 2026-10-15 14:02:06"
-    )
+    orders = f"day {first} of month {second}, or day {second} of month {first}"
+    return f"holds {dates[0]!r}, which may be {orders}; export dates as in ISO 8601, 2026-10-15 14:02:06"
 
 
 def is_time(cell: str) -> bool:
