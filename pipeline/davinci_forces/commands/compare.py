@@ -74,11 +74,8 @@ def _lines(
         lines += [f"  and{counts(group[most:])[1:]}: --all lists them"] if group[most:] else []
     if changed:
         with_error = sum(before[key].std is not None or after[key].std is not None for key in shared)
-        lines += [
-            "",
-            f"between independent recordings, about {0.05 * with_error:.0f} of the {with_error} numbers with a "
-            "standard error would change by chance",
-        ]
+        share = f"about {0.05 * with_error:.0f} of the {with_error} numbers with a standard error"
+        lines += ["", f"between independent recordings, {share} would change by chance"]
     removed, added = [c.key for c in differing if not c.after], [c.key for c in differing if not c.before]
     for verb, keys in (("removed", removed), ("added", added)):
         more = [f"  and {len(keys) - most} more: --all lists them"] if len(keys) > most else []

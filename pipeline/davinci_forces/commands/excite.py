@@ -145,8 +145,6 @@ def _error_lines(parameters: "Sequence[ExpectedParameter]") -> list[str]:
 
 def _spread(starts: dict[str, float | None]) -> str:
     """How well the starts agree: a search that reached the optimum reaches it from several starts."""
-    optima = (
-        f"{name} {starts[name]:.4f}" if starts[name] is not None else f"{name} none"
-        for name in ("best", "median", "worst")
-    )
+    objectives = {name: starts[name] for name in ("best", "median", "worst")}
+    optima = (f"{name} none" if value is None else f"{name} {value:.4f}" for name, value in objectives.items())
     return f"  {starts['number']} starts of the search: {', '.join(optima)}"

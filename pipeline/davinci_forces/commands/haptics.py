@@ -58,10 +58,9 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
 
     response = haptic.response(scenario)
     if not response.is_followed or not limits.is_followed_without_friction(scenario):
-        raise BadRequest(
-            f"{scenario.title}: the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so "
-            "it follows no hand; state other gains, [arm.control], another `tick` of the drivers, or another [arm.body]"
-        )
+        why = f"the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so it follows no hand"
+        remedy = "state other gains, [arm.control], another `tick` of the drivers, or another [arm.body]"
+        raise BadRequest(f"{scenario.title}: {why}; {remedy}")
     loop = limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:

@@ -150,10 +150,9 @@ def _flags(source: str, survey: _Survey) -> Iterator[str]:
 
     clock = survey.statistics
     if source and (clock.backward or clock.repeated):
-        yield (
-            f"time {source!r} goes back {clock.backward} times and repeats {clock.repeated} times, first in row "
-            f"{clock.bad_row + 1}; name another time channel, or add rate = ... [Hz] for this log in study.toml"
-        )
+        steps = f"goes back {clock.backward} times and repeats {clock.repeated} times, first in row {clock.bad_row + 1}"
+        remedy = "name another time channel, or add rate = ... [Hz] for this log in study.toml"
+        yield f"time {source!r} {steps}; {remedy}"
     yield from clocks.remarks(clock, survey.rate)
 
 

@@ -49,11 +49,8 @@ def run(
         echo(writing.text(arm), nl=False)
         return
     n = arm.chain.n if arm.chain else 0
-    q = (
-        numbers_of_option("--at", at)
-        if at is not None
-        else [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
-    )
+    zeros = [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
+    q = zeros if at is None else numbers_of_option("--at", at)
     document = _document(arm, q, numbers_of_option("--dq", dq) if dq is not None else [])
     echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
 
@@ -146,10 +143,8 @@ def _singular(chain: Any, q: list[float]) -> str:
     of_a_slide = kinds == [{False}, {False}, {True}]
     slides = ", ".join(sorted({f"{slide:.4f}" for slide in singular_slides(chain, q[1])})) if of_a_slide else ""
     where = f"; at this pitch, the slide positions {slides} m are singular" if slides else ""
-    return (
-        f"singular: the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}, so in one direction "
-        f"the force at the tip cannot be computed from their efforts{where}"
-    )
+    why = f"the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}"
+    return f"singular: {why}, so in one direction the force at the tip cannot be computed from their efforts{where}"
 
 
 def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
@@ -185,9 +180,8 @@ def _joint_lines(robot: "Robot", J_v: list[list[float]]) -> Iterator[str]:
         terms = " + ".join(term.name for term in joint.terms)
         column = [row[i] for row in J_v if i < len(row)]
         size = math.hypot(*column)
-        towards = ", ".join(
-            f"{x / size if abs(x) > 0.005 * size else 0.0:.2g}" for x in column if size > PRINTED_AS_ZERO
-        )
+        direction = [x / size if abs(x) > 0.005 * size else 0.0 for x in column if size > PRINTED_AS_ZERO]
+        towards = ", ".join(f"{x:.2g}" for x in direction)
         up = robot.chain.up if robot.chain else (0.0, 0.0, 0.0)
         rises = sum(map(float.__mul__, column, up)) / (size or 1.0)
         side = ", down" if rises < -0.9 else ", up" if rises > 0.9 else ""

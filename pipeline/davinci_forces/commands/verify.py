@@ -34,11 +34,10 @@ def run(
         return
     pages = not again or verification.has_same_environment(folders)
     verified = verification.verify(reading.read(study), folders, "".join(report_id.split()).lower(), pages)
-    echo(
-        f"{study}: {verified.raw} raw, {verified.processed} processed and {verified.reports} report files are "
-        f"unchanged, all {verified.numbers} numbers of results.json agree with their records, and writing the "
-        f"{'report' if pages else 'results.json'} again gives the same bytes; the report ID is {verified.identity}"
-    )
+    files = f"{verified.raw} raw, {verified.processed} processed and {verified.reports} report files are unchanged"
+    numbers = f"all {verified.numbers} numbers of results.json agree with their records"
+    content = f"writing the {'report' if pages else 'results.json'} again gives the same bytes"
+    echo(f"{study}: {files}, {numbers}, and {content}; the report ID is {verified.identity}")
     if verified.unrelated:
         echo(f"{study}: not checked, since they are not part of the results: {', '.join(verified.unrelated)}")
     if again:

@@ -148,10 +148,7 @@ def measured_limit(
 
     headline = limit(H * unfiltered, Z)
     errors = [limit((H + part) * unfiltered, Z) - headline for part in (std, 1j * std) if known]
-    errors += [
-        limit(*gain_and_impedance(scenario, f)) - limit(G, Z) if is_followed(scenario) else math.nan
-        for scenario in changed
-    ]
+    errors += [limit(*gain_and_impedance(s, f)) - limit(G, Z) if is_followed(s) else math.nan for s in changed]
     return {
         "k_t_limit": headline, "k_t_limit_std": math.hypot(*errors) if errors else math.nan, "limit_frequency": f,
         "filter_lag": -float(np.angle(H)) / w, "filter_lag_std": std / abs(H) / w, "filter_share": abs(H),

@@ -22,7 +22,6 @@ from davinci_forces.toml import TomlTable
 MAX_TICKS = 2_000_000  # ticks of one simulation
 MAX_DELAY = 5.0  # [s] largest delay of positions or forces on the link
 
-
 Pair = tuple[float, float]
 
 
@@ -159,8 +158,7 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         plan=_plan(table),
     )
     if scenario.friction >= 1.0:
-        problem = f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls"
-        tissue.problem(problem, "friction")
+        tissue.problem(f"friction must be below 1, not {scenario.friction:g}, because tissue never pulls", "friction")
     table.close_all()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:

@@ -157,8 +157,7 @@ def _log(folders: Folders, entry: LogEntry) -> Log:
     from davinci_forces.logs.joined import open_joined
     from davinci_forces.logs.parts import open_parts
 
-    missing = [file for file in entry.files if not (folders.raw / file).exists()]
-    if missing:
+    if missing := [file for file in entry.files if not (folders.raw / file).exists()]:
         names = ", ".join(map(repr, missing))
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
     files = [folders.raw / file for file in entry.files]

@@ -47,10 +47,9 @@ class Holder:
         """Raise `BadRequest` unless this process, which holds the lock of a folder by a file, has certainly ended."""
         text = f"process {self.process} on {self.host.rpartition('.')[0]}, which took the lock at {self.taken[:19]} UTC"
         if self.host != this_host():
-            raise BadRequest(
-                f"{folder}: a run on another host or in a container holds the lock: {text}; this host cannot see "
-                f"whether it has ended: make sure that it has, then delete {file}"
-            )
+            why = f"a run on another host or in a container holds the lock: {text}"
+            remedy = f"make sure that it has, then delete {file}"
+            raise BadRequest(f"{folder}: {why}; this host cannot see whether it has ended: {remedy}")
         start = start_of(int(self.process))
         if start is not None and (start == self.start or "" in (start, self.start)):
             ended = "" if start else f"; if it has ended, delete {file}"

@@ -205,10 +205,9 @@ class Runner:
         for task in tasks:
             reasons = self._reasons(task)
             if reasons and not self.writable:
-                raise BadRequest(
-                    f"{self.folders.processed} cannot be written to, and {stage_of(task.step)} has to run: "
-                    f"{_brief(reasons)}; allow writing, or name other folders with --processed and --reports"
-                )
+                why = f"{stage_of(task.step)} has to run: {_brief(reasons)}"
+                remedy = "allow writing, or name other folders with --processed and --reports"
+                raise BadRequest(f"{self.folders.processed} cannot be written to, and {why}; {remedy}")
             if reasons and not self._is_forced(task) and (source := reuse(self.ledger, task)):
                 self.console.say(f"{stage_of(part.step)}: copied from {source}, which has the same robot and settings")
                 self.ran += 1

@@ -225,8 +225,7 @@ def recompute(folders: Folders, by_bytes: bool, jobs: int = 1) -> list[str]:
             runs.run(folders.raw, ALL, new.processed.parent, new.reports.parent, jobs=jobs, verbosity="quiet")
         stored, computed = Ledger(folders), Ledger(new)
         before = {(entry.stage, entry.task) for entry in stored.entries() if entry.failed}
-        failed = [e for e in computed.entries() if e.failed and (e.stage, e.task) not in before]
-        if failed:
+        if failed := [e for e in computed.entries() if e.failed and (e.stage, e.task) not in before]:
             lines = (f"recomputed from raw/, {e.stage} fails on {e.task}: {e.failed}" for e in failed)
             raise NotReproduced("\n".join(lines))
         if by_bytes:
@@ -239,8 +238,7 @@ def compare_files(stored: Ledger, computed: Ledger) -> list[str]:
     """Compare all outputs by their hashes, in the order of the stages; raises as `recompute` does."""
     by_stage = (sorted(ledger.entries(), key=lambda e: ALL.index(stage_of(e.stage))) for ledger in (stored, computed))
     old, new = ({name: sha for e in entries for name, sha in e.outputs.items()} for entries in by_stage)
-    different = [str(stored.folders.file(name)) for name in old | new if old.get(name) != new.get(name)]
-    if different:
+    if different := [str(stored.folders.file(name)) for name in old | new if old.get(name) != new.get(name)]:
         count = f"{len(different)} of {len(old | new)} files differ from those recomputed from raw/"
         raise NotReproduced(f"{count}: {shorten(different, MAX_NAMES)}")
     return [f"recomputed from raw/: {len(new)} files are the same, byte for byte"]
@@ -252,11 +250,10 @@ def compare_numbers(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
     for key in old | new:
         for what in differences(key, old.get(key), new.get(key)):
             groups.setdefault(what, []).append(key)
-    counts = (
-        f"{len(keys)} {what}" + (f" ({shorten(keys, MAX_NAMES)})" if keys else "") for what, keys in groups.items()
-    )
+    examples = {what: f" ({shorten(keys, MAX_NAMES)})" if keys else "" for what, keys in groups.items()}
+    counts = "; ".join(f"{len(groups[what])} {what}{names}" for what, names in examples.items())
     head = "recomputed from raw/ with another processor or packages, so compared by number and not by byte"
-    text = f"{head}: of {len(new)} numbers {'; '.join(counts)}"
+    text = f"{head}: of {len(new)} numbers {counts}"
     if groups.keys() & {NEW, MISSING, WRONG}:
         raise NotReproduced(text)
     return [text]

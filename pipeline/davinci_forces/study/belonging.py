@@ -108,8 +108,7 @@ def arm_of(
                 arm = Arm("dvrk_psm", robots.load("dvrk_psm", folder), "")
             return arm._replace(reason=arm.reason or "by the joints in the names of channels or files")
     n = max(holding.joints for holding in counted)
-    beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
-    if beside:
+    if beside := [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]:
         return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have, paired in order")
     said = next((word for word in DAVINCI_WORDS if word in words), "")
     may_be = any(2 in holding.moving for holding in counted) and not words & OTHER_ARMS

@@ -68,9 +68,8 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
             with suppress(ValueError):
                 robot_name = Path(robot_name).absolute().relative_to(folder.absolute()).as_posix()
         if not (is_inside(robot_name) and (folder / robot_name).exists()):
-            raise BadRequest(
-                f"--robot {robot_name}: copy that file into {folder}, beside study.toml, and give its name there"
-            )
+            remedy = f"copy that file into {folder}, beside study.toml, and give its name there"
+            raise BadRequest(f"--robot {robot_name}: {remedy}")
     stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
     arms, why_not = (stated, []) if stated else belonging.candidates(folder)
     drawn: list[DraftLog] = []

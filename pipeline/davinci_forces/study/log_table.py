@@ -151,9 +151,8 @@ class LogTable:
 
     def _contact(self) -> str:
         if not self.draft.touching:
-            return (
-                "# contact = [[12.0, 14.5]]  # [s] of contact; all else is free, unless free = [[0.0, 5.0]] is stated"
-            )
+            hint = "all else is free, unless free = [[0.0, 5.0]] is stated"
+            return f"# contact = [[12.0, 14.5]]  # [s] of contact; {hint}"
         if reason := _touches_throughout(self.draft):
             return f'contact = "all"  # {reason}'
         return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'

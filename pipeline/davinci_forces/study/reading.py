@@ -162,11 +162,10 @@ def _remarks(table: TomlTable, logs: Sequence[LogEntry]) -> Iterator[str]:
         yield f"{table.file.name}:{line}: the setting {name!r} no longer has an effect; remove it"
     for i, log in enumerate(logs):
         if log.role == "weight" and log.weight is None:
-            yield (
-                f"{table.file.name}:{table.file.line(('log', i, 'role'))}: log {log.name!r} has the role weight, but "
-                "no weight, so no mass is estimated; write weight = { mass = <kg, if known> } for a mass at the tip, "
-                'and with moves_with = "<joint>", position = [x, y, z] in metres from the remote centre for another'
-            )
+            why = f"log {log.name!r} has the role weight, but no weight, so no mass is estimated"
+            tip = "write weight = { mass = <kg, if known> } for a mass at the tip"
+            elsewhere = 'with moves_with = "<joint>", position = [x, y, z] in metres from the remote centre for another'
+            yield f"{table.file.name}:{table.file.line(('log', i, 'role'))}: {why}; {tip}, and {elsewhere}"
 
 
 def _geared_twice(overrides: TomlTable, listed: Sequence[Joint], joints: Sequence[Joint]) -> Iterator[str]:
@@ -175,11 +174,10 @@ def _geared_twice(overrides: TomlTable, listed: Sequence[Joint], joints: Sequenc
         times = abs(joint.torque_constant / before.torque_constant)
         if times > AT_JOINT and joint.gear_ratio != 1.0 and "gear_ratio" not in overrides.values[joint.name]:
             line = overrides.file.line((*overrides.path, joint.name, "torque_constant"))
-            yield (
-                f"{overrides.file.name}:{line}: 1 A of {joint.name} counts as {joint.effort_per_ampere:.3g} "
-                f"{joint.unit('{effort}')}: its torque_constant is {times:.2g} times the robot's, its gear_ratio still "
-                f"{joint.gear_ratio:g}; if the constant is at the joint, write gear_ratio = 1.0, too"
-            )
+            effort = f"1 A of {joint.name} counts as {joint.effort_per_ampere:.3g} {joint.unit('{effort}')}"
+            why = f"its torque_constant is {times:.2g} times the robot's, its gear_ratio still {joint.gear_ratio:g}"
+            remedy = "if the constant is at the joint, write gear_ratio = 1.0, too"
+            yield f"{overrides.file.name}:{line}: {effort}: {why}; {remedy}"
 
 
 def settings_of(table: TomlTable, robot: Robot | None) -> Settings:

@@ -52,9 +52,7 @@ def _content(subject: str, name: str, table: TomlTable) -> Rating:
     texts = [table.text(key, "") for key in ("comment", "reviewer", "date", "results")]
     rating = Rating(subject, name, verdict, *texts)
     if not re.fullmatch(r"[0-9a-f]{64}", rating.results):
-        table.problem(
-            f"results must be the SHA-256 of the rated results.json, as the page exports it, not {rating.results!r}",
-            "results",
-        )
+        must = "results must be the SHA-256 of the rated results.json, as the page exports it"
+        table.problem(f"{must}, not {rating.results!r}", "results")
     table.close()
     return rating

@@ -68,8 +68,7 @@ def _word(path: str) -> tuple[str, str]:
     for name in reversed(path.split("/")):
         part = normalize("NFKD", normalize("NFC", name).translate(ASCII)).encode("ascii", "ignore").decode()
         text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:[.p]\d+)?", part)).lower()
-        kinds = [(kind, match[0]) for kind, words in ROLE_WORDS.items() if (match := words.search(text))]
-        if kinds:
+        if kinds := [(kind, match[0]) for kind, words in ROLE_WORDS.items() if (match := words.search(text))]:
             if kinds[0][0] in ("weight", "empty") and (mass := MASS.search(text)) and float(mass[1].replace("p", ".")):
                 return "weight", mass[0]  # `weight150g`: the mass says more than the word
             clash = {kind for kind, _ in kinds} & {"identification", "contact", "tissue", "weight"}

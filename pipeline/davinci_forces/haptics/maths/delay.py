@@ -93,10 +93,8 @@ def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
     Raises BadRequest if the delay has more than MAX_DELAY_SAMPLES samples.
     """
     if delay * rate > MAX_DELAY_SAMPLES:
-        raise BadRequest(
-            f"a delay of {delay:g} s is {delay * rate:.0f} samples of {rate:g} Hz, more than {MAX_DELAY_SAMPLES}; "
-            "leave the rate out: the force is then nearly continuous"
-        )
+        why = f"a delay of {delay:g} s is {delay * rate:.0f} samples of {rate:g} Hz, more than {MAX_DELAY_SAMPLES}"
+        raise BadRequest(f"{why}; leave the rate out: the force is then nearly continuous")
 
     def root_stiffness(w: Array) -> Complex:
         p = 1j * (w + 2.0 * np.pi * rate * IMAGES[:, np.newaxis])

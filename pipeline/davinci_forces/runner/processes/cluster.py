@@ -55,10 +55,9 @@ def require_terms(terms: Terms, folders: Folders) -> None:
     waited = 0.0
     while not (folders.processed / terms.mark).exists():
         if waited >= CONNECT_TIMEOUT:
-            raise BadRequest(
-                f"{here} does not see {folders.processed}; a cluster needs the same folders under the same paths on "
-                "every machine: name ones that are shared with --processed and --reports"
-            )
+            need = "a cluster needs the same folders under the same paths on every machine"
+            remedy = "name ones that are shared with --processed and --reports"
+            raise BadRequest(f"{here} does not see {folders.processed}; {need}: {remedy}")
         sleep(0.5)
         waited += 0.5
     if actual.code != terms.code:

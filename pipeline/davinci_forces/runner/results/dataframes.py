@@ -20,8 +20,7 @@ def read(study: Path, kind: str, selection: dict[str, object]) -> pd.DataFrame:
     """All records of a kind whose fields equal those of `selection`, in one DataFrame; see `davinci_forces.read`."""
     if kind not in KINDS:
         raise BadRequest(f"there is no kind of record {kind!r}; the kinds are {', '.join(KINDS)}")
-    unknown = set(selection) - set(KINDS[kind].scalars())
-    if unknown:
+    if unknown := set(selection) - set(KINDS[kind].scalars()):
         raise BadRequest(f"{kind} has no {', '.join(sorted(unknown))}; it has {', '.join(KINDS[kind].scalars())}")
     study_folders = folders(study, None, None)
     outputs = sorted({name for entry in Ledger(study_folders).entries() for name in entry.outputs})
@@ -54,9 +53,7 @@ def numbers_of(places: Folders) -> dict[str, Mapping[str, Any]]:
     file = places.reports / "results.json"
     try:
         rows = json.loads(read_bytes(file))
-        return {
-            row["key"]: {name: row[name] for name in FIELDS} | {"std_reason": row.get("std_reason")} for row in rows
-        }
+        return {r["key"]: {name: r[name] for name in FIELDS} | {"std_reason": r.get("std_reason")} for r in rows}
     except FileNotFoundError:
         raise MissingRecord(f"{file} does not exist; run `davinci-forces all {places.raw}`") from None
     except (ValueError, TypeError, LookupError) as error:
