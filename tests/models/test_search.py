@@ -9,7 +9,8 @@ import pytest
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.identification import candidates, search
-from davinci_forces.identification.candidates import library, reach_of
+from davinci_forces.identification.candidates import RIDGES, library, reach_of
+from davinci_forces.identification.joint_models import at_samples
 from davinci_forces.identification.observations import Processing, observe
 from davinci_forces.identification.search import CUTOFF_GRID, MIN_BETTER_BLOCKS, JointSearch, neighbours, sets_of_terms
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, presliding_friction, smooth_sign, stribeck
@@ -18,6 +19,7 @@ from davinci_forces.maths.signals.smoothing import lowpass
 from davinci_forces.records import Motion
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, coupled_arm, independent, model_of
+from tests.report.report_records import prediction
 
 ROLL, SLIDE = (davinci.ROBOT.joint(name) for name in ("hand_roll", "instrument_slide"))
 RATE, PERIOD, LAG = 200.0, 7.0, 0.005
@@ -269,3 +271,22 @@ def test_a_model_is_rebuilt_from_the_names_and_scales_of_its_parameters():
     for structure, made in (("independent", model), ("coupled", arm)):
         names, scales = zip(*((p.name, p.scale) for p in made.parameters), strict=True)
         assert model_of(davinci.ROBOT, structure, "chosen", made.group, names, scales) == made
+
+
+def test_ridges_that_are_tried_leave_no_gap_wider_than_ten_and_begin_with_hardly_any():
+    """A coupled arm is never without one: its links share what no motion tells apart."""
+    alone, *others = RIDGES["independent"]
+    assert alone == 0.0
+    assert others
+    assert max(others) <= 1e-3  # a joint's few parameters need no more
+    arm = RIDGES["coupled"]
+    assert 0.0 < arm[0] <= 1e-4
+    assert arm[-1] >= 0.03
+    assert all(1.0 < stronger / weaker <= 10.001 for weaker, stronger in pairwise(arm))
+
+
+def test_a_prediction_counts_at_samples_within_half_a_sample_of_its_own():
+    t, tau_hat = np.array([0.0, 0.01, 0.03]), np.array([1.0, 2.0, 3.0])
+    predicted = prediction(t=t, tau=tau_hat, tau_hat=tau_hat)
+    here = SimpleNamespace(rate=100.0, t=np.array([0.0, 0.0104, 0.0156, 0.0244, 0.0256, 0.0344, 0.0356]))
+    assert np.array_equal(at_samples(predicted, here), [1.0, 2.0, np.nan, np.nan, 3.0, 3.0, np.nan], equal_nan=True)
