@@ -43,8 +43,12 @@ def free_space(
 def free_smoothed(
     t: Array, windows: Sequence[tuple[float, float]], rate: float, unscored: Integers | None = None
 ) -> Booleans:
-    """Free space (N,) for the smoother, which responds to a contact as long before it as after it."""
-    return free_space(t, windows, rate, unscored, TRANSIENT)
+    """Free space (N,) for the smoother, which responds to a contact as long before it as after it.
+
+    It and the low-pass of the motion have no later samples in the last moments of a log, which are left out.
+    """
+    free, long = free_space(t, windows, rate, unscored, TRANSIENT), t[-1] - t[0] > 5 * TRANSIENT
+    return np.asarray(free & (t < t[-1] - LAST_MOMENTS)) if long else free
 
 
 def spans(t: Array, which: Booleans) -> list[tuple[float, float]]:

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import LAST_MOMENTS, MIN_FREE_SAMPLES, free_smoothed, free_space
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -36,9 +36,9 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
 def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -> Iterator[Diagnostic]:
     """Warn of efforts in free motion (N,) that are far above those of the rest of the log, as touches are.
 
-    Where the joint slows down to stop or to reverse, its friction may be the cause; at the end of a log, its low-pass.
+    Where the joint slows down to stop or to reverse, its friction may be the cause.
     """
-    moving = free & is_far_from_reversals(track.dq, 1.0 / track.rate) & (track.t < track.t[-1] - LAST_MOMENTS)
+    moving = free & is_far_from_reversals(track.dq, 1.0 / track.rate)
     if not moving.any():
         return
     size = np.where(moving, np.abs(track.tau_ext_smooth), 0.0)
