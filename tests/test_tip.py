@@ -27,6 +27,7 @@ from tests.test_averaging import entry
 
 RATE = 100.0
 T = np.arange(4000) / RATE
+LAST = T[-1] - 0.5  # [s] from which levels take no samples
 NAMES = ("hand_roll", "hand_pitch", "instrument_slide")
 SLIDE = {"davinci": 0.03, "dvrk_psm": 0.15}
 STD = np.array([0.05, 0.08, 0.5])
@@ -236,7 +237,7 @@ def test_samples_near_a_singular_pose_are_marked_and_not_judged():
     np.testing.assert_array_equal(force.near_singular, near)
     assert force.near_share == pytest.approx(near.mean())
     size = np.linalg.norm([force.f_x, force.f_y, force.f_z], axis=0)
-    calm = (T >= 1.0) & (T <= T[-1] - 0.5) & ~near
+    calm = (T >= 1.0) & (T < LAST) & ~near
     assert force.tested == calm.sum()
     assert force.force_rms == pytest.approx(np.sqrt(np.mean(size[calm] ** 2)))
 
@@ -274,7 +275,7 @@ def test_contacts_that_were_found_on_any_joint_are_told_once():
 
 def test_the_error_of_each_joint_at_the_tip_is_its_deviation_times_its_lever():
     budget = run("davinci", tracks("davinci", noise(7)))[TipBudget]
-    free = (T >= 1.0) & (T <= T[-1] - 0.5) & ((T < 8.0) | (T > 12.0))
+    free = (T >= 1.0) & (T < LAST) & ((T < 8.0) | (T > 12.0))
     median = np.median(path("davinci")[free], axis=0)
     lever = tip_force.lever(kinematics.jacobian(load("davinci", Path()).chain, median)[0])
     np.testing.assert_allclose(budget.lever, lever)

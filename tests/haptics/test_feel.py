@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from davinci_forces.cli import app
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics import scenario as scenarios
-from davinci_forces.haptics.limits import is_followed_without_friction
+from davinci_forces.haptics.limits import has_limits
 from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.haptics.maths.delay import sampled_limit
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
@@ -66,8 +66,8 @@ def test_an_arm_that_follows_by_the_help_of_its_friction_alone_is_refused(tmp_pa
     body = "inertia = 0.21\ngravity = -2.03\nviscous = 12.4\ncoulomb = [1.787, 1.787]"
     file.write_text(f"[arm.body]\n{body}\n[arm.control]\nvelocity_p = 0.0017\nvelocity_i = 0.42\n")
     scenario = haptic.complete_scenario(scenarios.read(file))
-    assert haptic.response(scenario).is_followed
-    assert not is_followed_without_friction(scenario)
+    assert haptic.is_followed(scenario)
+    assert not has_limits(scenario)
     said = CliRunner().invoke(app, ["haptics", str(file)])
     assert said.exit_code == 1
     assert "does not stabilise its body of 0.21 kg" in said.output

@@ -56,8 +56,7 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     from davinci_forces.haptics import limits
     from davinci_forces.haptics import loop as haptic
 
-    response = haptic.response(scenario)
-    if not response.is_followed or not limits.is_followed_without_friction(scenario):
+    if not limits.has_limits(scenario):
         why = f"the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so it follows no hand"
         remedy = "state other gains, [arm.control], another `tick` of the drivers, or another [arm.body]"
         raise BadRequest(f"{scenario.title}: {why}; {remedy}")
@@ -73,6 +72,7 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
             "felt_error": run.felt_error, "out_of_reach": float(run.t[-1]) if run.out_of_reach else None,
             **{key: json_number(value) for key, value in numbers.items()},
         }  # fmt: skip
+    response = haptic.response(scenario)
     rows = zip(response.frequency.tolist(), response.share.tolist(), response.late.tolist(), strict=True)
     felt = [dict(zip(("frequency", "share", "late"), row, strict=True)) for row in rows]
     return {"title": scenario.title, "tissue_stiffness": scenario.stiffness, "response": felt, "hands": hands}

@@ -44,9 +44,9 @@ def without_friction(scenario: FullScenario, body: Body | None = None) -> FullSc
     )  # fmt: skip
 
 
-def is_followed_without_friction(scenario: FullScenario) -> bool:
-    """Whether the linear arm follows a slow hand; a loose controller may follow by the help of friction alone."""
-    return is_followed(without_friction(scenario))
+def has_limits(scenario: FullScenario) -> bool:
+    """Whether the arm follows a slow hand, and not by the help of its friction alone, as with a loose controller."""
+    return is_followed(scenario) and is_followed(without_friction(scenario))
 
 
 def gain_and_impedance(scenario: FullScenario, frequency: float) -> tuple[complex, complex]:

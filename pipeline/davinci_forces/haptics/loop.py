@@ -48,11 +48,6 @@ class FeltResponse(NamedTuple):
         return np.asarray(np.abs(self.T))
 
     @property
-    def is_followed(self) -> bool:
-        """Whether the arm follows a slow hand; one that its controller does not stabilise does not."""
-        return bool(FOLLOWED[0] < self.share[0] < FOLLOWED[1])
-
-    @property
     def late(self) -> Array:
         """Delay of the felt force (N,) [s]."""
         return np.asarray(-np.unwrap(np.angle(self.T)) / (2.0 * np.pi * self.frequency))
@@ -102,8 +97,8 @@ def response(scenario: FullScenario) -> FeltResponse:
 
 
 def is_followed(scenario: FullScenario) -> bool:
-    """Whether the arm of a scenario follows a slow hand."""
-    return FeltResponse(FREQUENCIES[:1], np.array([felt_share(scenario, float(FREQUENCIES[0]))])).is_followed
+    """Whether the arm of a scenario follows a slow hand; one that its controller does not stabilise does not."""
+    return FOLLOWED[0] < abs(felt_share(scenario, float(FREQUENCIES[0]))) < FOLLOWED[1]
 
 
 def felt_share(scenario: FullScenario, frequency: float) -> complex:

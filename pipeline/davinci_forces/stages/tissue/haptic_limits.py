@@ -51,13 +51,12 @@ def run(
         q_tau or (joint.q_tau if joint else 0.0),
         tuned.delay if tuned else haptics.filter_delay,
     )
-    answer = haptic.response(scenario)
-    if not answer.is_followed or not limits.is_followed_without_friction(scenario):
+    if not limits.has_limits(scenario):
         yield not_followed(scenario, arm_from)
         return
     loop = limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
-    yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
+    yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, haptic.response(scenario))
     for name, hand in scenario.hands:
         yield limits.limits_of(scenario, name, hand, loop, recordings, () if haptics.body else bodies[1:])
         yield haptic.experiment(scenario, name, hand)
