@@ -584,14 +584,27 @@ def test_the_error_of_an_impulse_includes_those_of_onset_and_release_unless_its_
     assert stated.impulse_std[0] < 0.1 * found.impulse_std[0]
 
 
-def test_a_log_that_identifies_holds_contacts_only_where_its_effort_is_far_from_the_rest():
-    effort = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
-    quiet = [Threshold("hand_roll", "rts", 0.05, 0.005, 0.11, 0.01, "c", 1, 0.95, 0.01, 0.2)]
-    about = entry(role="identification")
-    assert measured(track(effort, std=0.01, role="contact"), quiet, entry(role="contact"))
-    assert not measured(track(effort, role="identification"), quiet, about)
-    touched = effort + np.where((T >= 20) & (T <= 22), 2.0, 0.0)
-    [contact] = measured(track(touched, role="identification"), quiet, about)
+def test_free_motion_of_a_fitted_log_raises_the_alarm_level_unless_it_is_far_from_the_rest_as_a_touch_is():
+    """What was fitted shows less of the model's error than what was not, so it exceeds no level by that error."""
+    fitted = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
+    about, other = entry(role="identification"), entry(role="validation")
+
+    def threshold(effort):
+        quiet, _, *_ = assess.run(track(slow_noise(0.02), log="check", role="validation"), other, arm.ARM)
+        space, _, *_ = assess.run(track(effort, role="identification"), about, arm.ARM)
+        alone, together = list(assess.gather([quiet])), list(assess.gather([quiet, space]))
+        assert together[0].level_from == "check"
+        assert together[0].detection_level == alone[0].detection_level
+        return alone, together, space
+
+    alone, together, space = threshold(fitted)
+    assert measured(track(fitted, std=0.01, role="contact"), alone, entry(role="contact"))
+    assert together[0].alarm_level == space.free_max > 2.0 * alone[0].alarm_level
+    assert not measured(track(fitted, role="identification"), together, about)
+    touched = fitted + np.where((T >= 20) & (T <= 22), 2.0, 0.0)
+    _, together, space = threshold(touched)
+    assert together[0].alarm_level == space.free_max < 0.5
+    [contact] = measured(track(touched, role="identification"), together, about)
     assert contact.onset.tolist() == pytest.approx([20.0], abs=0.1)
 
 

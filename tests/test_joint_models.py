@@ -126,6 +126,20 @@ def test_the_fit_that_the_study_names_is_scored_and_has_its_residual_although_it
     assert [(r.model, r.estimator) for r in along if isinstance(r, Residual)] == [("other", "huber")]
 
 
+@pytest.mark.parametrize(("end", "is_edge"), [(4, True), (60, False)])
+def test_what_is_not_scored_at_an_end_of_a_log_may_be_due_to_the_low_pass_if_it_is_as_short(identified, end, is_edge):
+    signal, fits, _ = identified
+    fresh = arm.motion(replace(signal, log="fresh", role="validation"))
+    tau = fresh.tau.copy()
+    tau[:end] += 30.0
+    about = entry(name="fresh", role="validation")
+    made = predict.run([replace(fresh, tau=tau)], fits, about, arm.ARM, lowpass=CUTOFF, fit="independent.lse")
+    [said] = [text for d in made if isinstance(d, Diagnostic) and d.subject.endswith(".steps") for text in d.text]
+    assert "are not scored: the effort steps there" in said
+    assert ("or where a log begins or ends amid a motion" in said) == is_edge
+    assert ("leave them out by `skip` and `until`" in said) == (not is_edge)
+
+
 def test_a_residual_is_bounded_and_0_where_the_joint_rests_in_every_period(identified):
     """A rest of a tenth of the period; all of the first is unscored, too, as where a log starts from rest."""
     signal, fits, predictions = identified

@@ -211,7 +211,9 @@ def test_what_is_not_plausible_is_refused(tmp_path, old, new, says):
 
 def test_a_study_may_say_how_long_its_tool_was(tmp_path):
     """And the report is told, as of all that a study changes of a robot."""
-    made = read(tmp_path, GOOD.replace('"davinci"', '"dvrk_psm"\ntool = { length = 0.5 }'))
+    made = read(
+        tmp_path, GOOD.replace('"davinci"', '"dvrk_psm"\ntool = { length = 0.5 }\nrobot_overrides.hand_roll = {}')
+    )
     assert made.robot.tool.length == 0.5
     at, usual = (tip(robot.chain, [0.0, 0.0, 0.1]) for robot in (made.robot, robots.load("dvrk_psm", tmp_path)))
     assert (usual - at)[2] == pytest.approx(0.5 - 0.4162)

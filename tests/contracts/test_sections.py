@@ -352,19 +352,19 @@ def test_the_verdict_on_a_study_is_a_sentence_by_the_rules_of_the_table(full: Co
     said = opening.verdict_sentence(full, trusts(full, hand_roll=0.05, hand_pitch=0.16, instrument_slide=0.3))
     level = full.number("threshold.hand_roll.alarm_level", 2, std=None)
     assert said == (
-        f"An effort stands out from free motion above its alarm level: {level} on the hand roll; on an unseen path the "
-        "model errs by 16 % on the hand pitch, so judge its efforts with caution; on an unseen path the model errs by "
-        "30 % on the instrument slide, too much to be believed; in free motion the 95 % band of each joint is wide "
-        "enough."
+        f"The smallest effort that stands out from free motion (alarm level) is {level} on the hand roll; on an unseen "
+        "path the model errs by 16 % on the hand pitch, so judge its efforts with caution; on an unseen path the model "
+        "errs by 30 % on the instrument slide, too much to be believed; in free motion the 95 % band of each joint is "
+        "wide enough."
     )
     [narrow] = trusts(full, hand_roll=0.05)
     narrow = replace(narrow, space=replace(narrow.space, coverage=0.8))
     said = opening.verdict_sentence(full, [narrow])
-    where = f"above its alarm level: {level} on the hand roll (whose 95 % band is too narrow)"
-    assert said == f"An effort stands out from free motion {where}."
+    where = f"(alarm level) is {level} on the hand roll (whose 95 % band is too narrow)"
+    assert said == f"The smallest effort that stands out from free motion {where}."
     [wide] = trusts(full, hand_roll=0.05)
     wide = replace(wide, space=replace(wide.space, coverage=0.995))
-    assert opening.verdict_sentence(full, [wide]).endswith("is wide enough, too wide on the hand roll.")
+    assert opening.verdict_sentence(full, [wide]).endswith("is too wide on the hand roll, and too narrow on none.")
     [same] = trusts(full, hand_roll=0.16)
     same = replace(same, prediction=replace(same.prediction, path="same path"))
     assert "On the fitted path the model errs by 16 % on the hand roll, and another path was not tested" in (
@@ -869,11 +869,21 @@ def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, ca
         replace(c, alarm_level=0.6 * np.sort(np.abs(c.peak))[0]) for c in found
     ]  # its smallest is below twice that
     small = sum(int((np.abs(c.peak) < 2 * c.alarm_level).sum()) for c in found)
-    doubt = f"** Of these, {small} peaks below twice that level may be due to the model: see [@contacts]."
+
+    def number_of(about, contact):
+        row = np.argmin(np.abs(contact.peak))
+        return str(about.number(f"contact.{contact.log}.{contact.joint}.{row + 1}.peak", 3))
+
+    doubt = f"** {small} peaks below twice the alarm level may be due to the model: see [@contacts]."
     for about, doubted in ((known, False), (unknown, True)):
-        assert (doubt in summary.opening_paragraph(about, found)) == doubted
+        paragraph = summary.opening_paragraph(about, found)
+        assert doubt in paragraph
+        assert all(number_of(about, c) in paragraph for c in found)  # none is larger
         notes = [block.text for block in walk(written("contacts", about)) if isinstance(block, Prose)]
         assert any("State windows in which nothing touched the arm, `free = " in note for note in notes) == doubted
+    clear = [replace(found[0], alarm_level=0.1 * np.abs(found[0].peak).min(), above=found[0].above | 1), *found[1:]]
+    paragraph = summary.opening_paragraph(known, clear)
+    assert [number_of(known, c) in paragraph for c in clear] == [True] + [False] * len(found[1:])
 
 
 def test_a_joint_without_efforts_is_not_counted_and_not_sent_to_record_what_it_has(lab: Lab, catalogue: Catalogue):
@@ -996,7 +1006,11 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     [contact] = full.catalogue.records(TipContact)
     [line] = opening.forces_at_tip(full)
     largest = full.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
-    assert line == f"**{contact.log}**: force at the tip up to {largest}, if nothing else was touched"
+    row = int(np.argmax(contact.f_peak))
+    when = f"{contact.onset[row]:.1f} to {contact.release[row]:.1f} s"
+    assert (
+        line == f"**{contact.log}**: force at the tip up to {largest} ({when}), if the arm was touched at its tip alone"
+    )
     assert f"up to {contact.f_peak.max():.2f}" in line
     [joint, *_] = full.study.robot.joints
     drive = replace(joint, gear_ratio=200.0, torque_constant=0.0438)

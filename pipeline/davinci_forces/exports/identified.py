@@ -9,12 +9,11 @@ import numpy as np
 from davinci_forces.errors import BadRequest
 from davinci_forces.files import json_number, visible
 from davinci_forces.filters import DEFAULT
-from davinci_forces.filters.error_bands import free_errors
+from davinci_forces.filters.error_bands import free_errors, joint_alarm_level
 from davinci_forces.filters.response import noise_model, ramp_lag
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.contact.detection import alarm_level
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -251,7 +250,8 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
         noise = noise_model(tuned, joint, 1.0 / rate, study.settings.q_tau)
         R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, 1.0 / rate)
         bands = [calibrate(free_errors(band, False)) for band in catalogue.select(ErrorBand, joint=joint.name)]
-        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in free_spaces(catalogue, joint.name)]
+        spaces = catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
+        levels = [joint_alarm_level(spaces)[0]] if spaces else []
         levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
             "rate": rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],

@@ -1,10 +1,13 @@
-"""The variance of a log's smoothed external effort, calibrated on free motion of other logs."""
+"""The variance of a log's smoothed external effort, and the alarm level of a joint, from free motion of its logs."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.contact.detection import alarm_level
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, FreeErrors, calibrate
-from davinci_forces.records import ErrorBand
+from davinci_forces.records import ErrorBand, FreeSpace
 from davinci_forces.records.prediction import ANOTHER_PATH
 
 OTHER_BLOCKS = "its own other blocks"  # the source if there is no other log
@@ -43,3 +46,13 @@ def free_errors(band: ErrorBand, is_centred: bool) -> FreeErrors:
     means = np.bincount(source, weights=band.tau_ext_smooth) / count
     error = band.tau_ext_smooth - means[source] * is_centred
     return FreeErrors(source, band.block, band.dq, error, band.tau_ext_std_filter, band.uncorrelated)
+
+
+def joint_alarm_level(spaces: Sequence[FreeSpace]) -> tuple[float, FreeSpace]:
+    """The alarm level of a joint over the free motion of its logs, and the log that gives it.
+
+    A fitted log shows less of the model's error than others, so beside others it counts by its largest effort alone.
+    """
+    others = [space for space in spaces if space.role != "identification"] or spaces
+    levels = [(alarm_level(space.free_rms, space.free_max, space.crossings), space) for space in others]
+    return max([*levels, *((space.free_max, space) for space in spaces)], key=lambda pair: pair[0])

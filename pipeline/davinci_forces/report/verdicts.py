@@ -241,8 +241,8 @@ def grade(share: float, good: float, caution: float) -> Level:
 
 
 def is_small(contact: Contact) -> Booleans:
-    """Whether the peak of each contact (C,) is so near the alarm level that it may be an error of the model."""
-    return np.asarray(np.abs(contact.peak) < SMALL * contact.alarm_level)
+    """Whether each contact (C,) that nobody stated is so near the alarm level that it may be an error of the model."""
+    return np.asarray((np.abs(contact.peak) < SMALL * contact.alarm_level) & (contact.stated == 0))
 
 
 def is_mostly_constant(p: Prediction) -> bool:

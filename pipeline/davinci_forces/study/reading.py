@@ -70,7 +70,8 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     table.file.refuse(BadStudy)
     assert robot is not None
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
-    changed = overrides.values | {name: table.values[name] for name in ("tool", "base") if name in table}
+    overridden = {name: values for name, values in overrides.values.items() if values}
+    changed = overridden | {name: table.values[name] for name in ("tool", "base") if name in table}
     about = changed, truth, scenario, table.values.get("haptics", ""), baseline, lines, tuple(remarks)
     return Study(folder, title, robot, simulated, settings, logs, *about)
 

@@ -15,7 +15,7 @@ FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact, reversals, rests or transients",
     "mended": "white once tested causes are removed",
-    "unexplained": "not white even with all tested causes removed",
+    "unexplained": "not white, and no tested cause explains it in full",
 }
 PRINTED_RUNS = 9  # largest number of runs in the table of the PDF
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))

@@ -110,9 +110,10 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
         caused = Line(load.t, mass * load.load + offsets[load.joint], f"{by} mass", "vermillion", "dashed")
         effort = label(load, "tau_ext", "external effort")
         panels.append(Panel(title(load.joint), "time [s]", effort, (measured, caused)))
+    plus = " plus the joint's offset of the day" if any(offsets.values()) else ""
     caption = (
         f"{name}: external effort {once} of each joint that carries the mass{subtracted}, and the effort of the {by} "
-        "mass plus the joint's offset of the day."
+        f"mass{plus}."
     )
     alt = (
         f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "

@@ -4,8 +4,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from davinci_forces.filters.error_bands import joint_alarm_level
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics, typical_alarm_level
+from davinci_forces.maths.contact.detection import free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
@@ -14,6 +15,7 @@ from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
+MAX_FITTED = 2.0  # largest effort of a fitted log over its typical alarm level, beyond which it is a touch
 TOUCHED = 3.0  # largest effort of a log over its typical alarm level; recorded free motion stays below 1.7
 
 
@@ -59,10 +61,16 @@ def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -
 
 
 def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans) -> Iterator[FreeSpace]:
-    """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples."""
+    """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples.
+
+    The largest effort of a log that identifies is at most twice its typical alarm level: beyond, something touched it.
+    """
     if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
+    if track.role == "identification":
+        typical = typical_alarm_level(tau_ext, free, track.rate)
+        statistics = statistics._replace(largest=min(statistics.largest, MAX_FITTED * typical))
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,
@@ -83,8 +91,7 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     for joint, joint_spaces in by_name(smoothed, "joint").items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
-        alarms = [alarm_level(space.free_rms, space.free_max, space.crossings) for space in unfitted]
-        level, source = max(zip(alarms, unfitted, strict=True), key=lambda pair: pair[0])
+        level, source = joint_alarm_level(joint_spaces)
         yield Threshold(
             joint, SMOOTHER, worst.detection_level, worst.detection_level_std, level,
             level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log, len(unfitted),

@@ -44,7 +44,7 @@ def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: R
         return
     last_moments = max(detection.TIP_REACH * track.smooth_rise, LAST_MOMENTS)
     steady = is_past_transient(track.t) & (track.t <= track.t[-1] - last_moments)
-    level = max(threshold.alarm_level, level_while_identified(track, entry)) + unknown_friction(track)
+    level = threshold.alarm_level + unknown_friction(track)
     detected = [
         event
         for event in detection.events(track.t, *steady_effort(track), level, track.smooth_rise)
@@ -83,18 +83,6 @@ def is_within(event: Event, window: Window) -> bool:
     """Whether a contact and a window share at least half of the shorter of the two."""
     shared = min(event.release, window[1]) - max(event.onset, window[0])
     return shared > 0.0 and shared >= 0.5 * min(event.release - event.onset, window[1] - window[0])
-
-
-def level_while_identified(track: Track, entry: LogEntry) -> float:
-    """The largest effort in a log that identifies, up to twice its typical alarm level; 0 in other logs.
-
-    Nothing should touch the arm in such a log.  Only what is far from the rest of it counts as a contact.
-    """
-    free = free_smoothed(track.t, entry.contact, track.rate, track.unscored)
-    if entry.role != "identification" or not free.any():
-        return 0.0
-    largest = float(np.abs(track.tau_ext_smooth[free]).max())
-    return min(largest, 2.0 * detection.typical_alarm_level(track.tau_ext_smooth, free, track.rate))
 
 
 def contacts(
@@ -167,11 +155,8 @@ def middle_effort(track: Track, contact: Window, free: Booleans, friction_std: A
 def hidden_peak(track: Track, onset: float) -> str:
     """State that a contact is too short for its peak to be seen."""
     text = f"{track.log}/{track.joint}: the contact at {onset:.4g} s is shorter than {track.smooth_rise:.2g} s, "
-    remedy = (
-        "state a window of a second around it in study.toml, and read its impulse; if nothing touched the arm then, it "
-        "is an error of the model"
-    )
-    return f"{text}which the smoother takes to show a step, so its peak may be several times larger: {remedy}"
+    why = "which the smoother takes to show a step, so its peak may be several times larger: read its impulse"
+    return f"{text}{why}; if nothing touched the arm then, it is an error of the model"
 
 
 def unknown_friction(track: Track) -> Array:

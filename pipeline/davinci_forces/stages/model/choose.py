@@ -237,9 +237,9 @@ def consistent_fits(
         if consistent.excess > NEGLIGIBLE_EXCESS:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
-            costs = ", ".join(f"{rmse:.3g} instead of {before:.3g} {unit} of {j}" for j, rmse, before, unit in errors)
+            costs = ", ".join(f"{x:.3g} {unit} of {j} ({100 * (x / y - 1):+.2g} %)" for j, x, y, unit in errors)
             message = f"{model.group}: no mechanism has the parameters of {name}"
-            follows = f"those of consistent leave an effort of {costs} where fitted, root mean square"
+            follows = f"with those of consistent, which one can have, the error where fitted is {costs}"
             yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 

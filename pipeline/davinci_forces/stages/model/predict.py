@@ -22,6 +22,7 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 OPPOSED = 0.5  # the error by the other sign, over the error, of an effort with a wrong sign
+EDGE = 3.0  # largest duration of what a low-pass spoils at the end of a log, times its cutoff
 MIN_LOST = 0.01  # share of a log that is not scored, from which a warning says so
 
 
@@ -80,9 +81,15 @@ def predict_joint(
     if steps := spans(motion.t, ~scored & is_evaluated(motion)):
         lost = sum(end - start for start, end in steps) / (motion.t[-1] - motion.t[0])
         severity = "warning" if lost > MIN_LOST else "note"
-        why = "the effort changes there in a step that the motion does not explain"
-        remedy = "as where a controller starts or stops; leave them out by `skip` and `until`"
-        texts = [f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}, {remedy}" for start, end in steps]
+        why = (
+            "the effort changes there in a step that the motion does not explain, as where a controller starts or stops"
+        )
+        edge = ", or where a log begins or ends amid a motion, which its low-pass cannot follow there"
+        texts = [
+            f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}"
+            + (edge if end - start < EDGE / motion.cutoff else "; leave them out by `skip` and `until`")
+            for start, end in steps
+        ]
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", severity, *texts)
     if labelled:
         yield from sign_warning(motion, along.tau_hat(labelled[-1][2], motion.joint), free)

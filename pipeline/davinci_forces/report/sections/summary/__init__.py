@@ -131,28 +131,30 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
             why = "none was found, and the study states no window of contact"
         return f"{text} No contact is measured: {why}."
     peaks = peaks_in_words(context, contacts)
+    small = sum(int(verdicts.is_small(contact).sum()) for contact in contacts)
+    doubt = f" {count(small, 'peak')} below twice the alarm level may be due to the model: see [@contacts]." * (
+        small > 0
+    )
     if not stated:
-        doubted = [contact for contact in contacts if not context.study.log(contact.log).has_known_free_motion]
-        small = sum(int(verdicts.is_small(contact).sum()) for contact in doubted)
-        doubt = f" Of these, {count(small, 'peak')} below twice that level may be due to the model: see [@contacts]."
         level = "the alarm level, which free motion crosses at most once in ten minutes"
-        text = f"{text} **{contacts_above} {level}; the study states no window of contact.{peaks}**"
-        return f"{text}{doubt}" if small else text
+        return f"{text} **{contacts_above} {level}; the study states no window of contact.{peaks}**{doubt}"
     outside = f" Outside the stated windows, {contacts_above} the alarm level." if unstated else ""
     peak_only = sum(int((contact.above * contact.stated * (1 - contact.found)).sum()) for contact in contacts)
     fewer = f", in {peak_only} of them with its peak only" if peak_only else ""
     each = "counted once for each joint on which they are measured"
     cases = f"{count(stated, 'case')} (stated windows, {each})"
     exceeds = f"Of {cases}, the effort exceeds the detection level in {above}{fewer}."
-    return f"{text} **{exceeds}{outside}{peaks}**"
+    return f"{text} **{exceeds}{outside}{peaks}**{doubt}"
 
 
 def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     """State the peaks with their standard errors, logs and times: all if they are few, else the largest of each joint.
 
-    Then name the joints of contact logs without any, and the level below which a contact is missed.
+    Small ones, which may be due to the model, are not named beside others.  Then name the joints of contact logs
+    without any, and the level below which a contact is missed.
     """
-    above = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
+    every = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
+    above = [(contact, row) for contact, row in every if not verdicts.is_small(contact)[row]] or every
     touched = {contact.joint for contact, _ in above}
     is_short = len(above) <= MAX_PEAKS
     if not is_short:

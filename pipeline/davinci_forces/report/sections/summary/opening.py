@@ -29,7 +29,9 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         for t in fine
         if t.space is not None
     ]
-    parts = [f"an effort stands out from free motion above its alarm level: {as_list(levels)}"] if levels else []
+    parts = (
+        [f"the smallest effort that stands out from free motion (alarm level) is {as_list(levels)}"] if levels else []
+    )
     parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
     narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `levels` names the good
     unseen = [t for t in trusts if t.space is None]
@@ -41,8 +43,9 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     if roles and not any(trusted.narrow for trusted in trusts):
         where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
         wide = [t for t in trusts if t.narrowest is not None and band(t.narrowest.coverage) == "info"]
-        which = f", too wide on {as_list([name_in_sentence(t.joint) for t in wide])}" if wide else ""
-        parts += [f"{where} the 95 % band of each joint is wide enough{which}"]
+        which = f"on {as_list([name_in_sentence(t.joint) for t in wide])}, and too narrow on none"
+        width = f"is too wide {which}" if wide else "of each joint is wide enough"
+        parts += [f"{where} the 95 % band {width}"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -87,11 +90,16 @@ def feedback(context: Context) -> Iterator[str]:
 def forces_at_tip(context: Context) -> Iterator[str]:
     """The largest force at the tip in the contacts of each log, with its standard error."""
     for contact in context.catalogue.records(TipContact):
-        largest = context.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
+        row = int(np.argmax(contact.f_peak))
+        largest = context.number(f"tip.{contact.log}.{row + 1}.peak", 3)
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
-        yield f"**{literal(contact.log)}**: force at the tip up to {largest}, if nothing else was touched{beside}"
+        when = f"{contact.onset[row]:.1f} to {contact.release[row]:.1f} s"
+        yield (
+            f"**{literal(contact.log)}**: force at the tip up to {largest} ({when}), if the arm was touched at its tip "
+            f"alone{beside}"
+        )
     robot = context.study.robot
     if robot.chain is not None and not context.catalogue.records(TipForce):
         in_amperes = any(joint.effort for joint in robot.joints)
