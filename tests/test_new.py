@@ -534,6 +534,16 @@ def test_words_of_several_laboratories_tell_the_role():
             assert said.role == role, name
 
 
+def test_free_motion_identifies_where_no_other_log_does_and_another_tests_and_is_to_be_checked():
+    def roles(*names):
+        said = roles_of([Evidence(name, name, Holding(moving=(0,), ranges={0: (-1.0, 1.0)})) for name in names])
+        assert all(("CHECK" in role.reason) == (role.role == "identification") for role in said)
+        return [role.role for role in said]
+
+    assert roles("free_run_a", "free_run_b", "validation") == ["identification", "identification", "validation"]
+    assert roles("free_run_a", "free_run_b") == ["identification", "validation"]
+
+
 @pytest.mark.parametrize("names", [("anregung", "pruefung"), ("excitación", "prueba"), ("Excitation", "essai")])
 def test_the_excitation_identifies_and_the_check_validates_in_other_languages(tmp_path, names):
     for scale, name in zip((1.0, 1.1), names, strict=True):  # the check reaches farther

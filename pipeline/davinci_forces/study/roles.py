@@ -202,11 +202,14 @@ def _cover(reach: dict[int, tuple[float, str]], recording: Evidence) -> None:
 
 
 def _with_identification(recordings: Sequence[Evidence], roles: list[Role]) -> list[Role]:
-    """Where no log identifies, take the free motion that reaches farthest."""
+    """Where no log identifies, take those called free if another one tests, else what reaches farthest."""
     free = [i for i, role in enumerate(roles) if role.role == "validation" and recordings[i].holding.moving]
     if free and not any(role.role == "identification" for role in roles):
+        called = [i for i in free if _word(recordings[i].path)[0] == "free"]
         best = max(free, key=lambda i: (len(recordings[i].holding.moving), _reach(recordings[i].holding)))
-        roles[best] = Role("identification", f"{roles[best].reason}; but there is no other log to identify from")
+        for i in called if 0 < len(called) < len(free) else [best]:
+            reason = roles[i].reason.removeprefix("CHECK: ").partition(":")[0]
+            roles[i] = Role("identification", f"CHECK: {reason}; but there is no other log to identify from")
     return roles
 
 

@@ -81,9 +81,7 @@ def predict_joint(
     if steps := spans(motion.t, ~scored & is_evaluated(motion)):
         lost = sum(end - start for start, end in steps) / (motion.t[-1] - motion.t[0])
         severity = "warning" if lost > MIN_LOST else "note"
-        why = (
-            "the effort changes there in a step that the motion does not explain, as where a controller starts or stops"
-        )
+        why = "the effort steps there as the motion does not explain, as where a controller starts or stops"
         edge = ", or where a log begins or ends amid a motion, which its low-pass cannot follow there"
         texts = [
             f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}"
