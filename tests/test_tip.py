@@ -123,6 +123,21 @@ def test_the_deviation_of_a_peak_holds_what_the_smoother_rounds_off_it():
     assert smooth[TipContact].f_z_std[0] > exact[TipContact].f_z_std[0]
 
 
+def test_the_error_of_the_largest_force_of_a_push_that_is_held_holds_what_noise_adds_to_it():
+    """Noise of which each second has one value raises the largest of a push of 4 s; the mean would be right."""
+    windows = tuple((float(start), start + 4.0) for start in range(2, 36, 7))
+    touched = (T[:, None] - [start for start, _ in windows]) % 1e3 < 4.0
+    held = touched.any(1)[:, None] * np.array([3.0, -4.0, 12.0])
+    slow = np.random.default_rng(4).normal(size=(41, 3)) * STD
+    tau = efforts("davinci", held) + np.repeat(slow, 100, axis=0)[: len(T)]
+    contact = run("davinci", tracks("davinci", tau), contact=windows)[TipContact]
+    plain = run("davinci", tracks("davinci", efforts("davinci", held)), contact=windows)[TipContact]
+    error = contact.f_peak - 13.0
+    assert error.mean() > 0.5 * plain.f_peak_std.mean()  # the largest is too large
+    assert np.sqrt(np.mean((error / plain.f_peak_std) ** 2)) > 1.3
+    assert np.sqrt(np.mean((error / contact.f_peak_std) ** 2)) < 1.1
+
+
 def test_what_is_rounded_off_each_joint_follows_from_its_own_rise():
     plain = tracks("davinci", efforts("davinci", PUSH * [1.0, 0.0, 0.0]))  # a force of the roll, almost alone
     slow = [replace(track, smooth_rise=0.2 if track.joint != "hand_roll" else 0.0) for track in plain]

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.contact.detection import HALF, rounded_off, without_rounding
+from davinci_forces.maths.contact.detection import HALF, largest_size, rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -200,10 +200,11 @@ def tip_contacts(
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
-    C, sigma_std, lost = peak_errors(force, tracks, chain, at)
+    u = f[at] / size[at, None]
+    C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, largest_in_free_motion(tracks, onset, release))
     x, y, z = f_peak = (f[at] + lost).T
     sigma, axes = tip_force.sigma_ellipsoid(C)
-    std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
+    std = np.sqrt(np.diagonal(C, axis1=1, axis2=2))
     yield TipContact(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
         t_peak=force.t[at], f_x=x, f_x_std=std[:, 0], f_y=y, f_y_std=std[:, 1], f_z=z, f_z_std=std[:, 2],
@@ -215,10 +216,20 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers) -> tuple[Array, Array, Array]:
+def largest_in_free_motion(tracks: Sequence[Track], onset: Array, release: Array) -> Array:
+    """Root mean square (K, 3) of each joint's largest effort in free windows as long as each contact (K,)."""
+    windows, lengths = list(zip(onset, release, strict=True)), np.round((release - onset) * tracks[0].rate).astype(int)
+    free = np.all([free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks], axis=0)
+    return np.nan_to_num([[largest_size(t.tau_ext_smooth, free, max(n, 1)) for t in tracks] for n in lengths.tolist()])
+
+
+def peak_errors(
+    force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, u: Array, largest: Array
+) -> tuple[Array, Array, Array]:
     """Covariance (K, 3, 3) of the force at peaks (K,), errors (K, 3) of its half-axes, and what is rounded off (K, 3).
 
-    They err by each joint's model variance, and what is rounded off is as uncertain as the rest of the force.
+    Noise raises the largest of many samples, so along its direction `u` (K, 3) the `largest` in free motion (K, 3)
+    counts, too.  Each joint's model variance has an error; what is rounded off is as uncertain as the rest of f.
     """
     J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
     std = np.stack([without_rounding(t.tau_ext_smooth_std[at], t.tau_ext_rounding[at]) for t in tracks], axis=-1)
@@ -231,7 +242,9 @@ def peak_errors(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Inte
         wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
         _, C_wider = tip_force.from_efforts(J, HALF * rounded, tip_force.covariance(wider, rho))
         squares += (tip_force.sigma_ellipsoid(C_wider)[0] - half_axes) ** 2
-    C_peak = C + lost[:, :, None] * lost[:, None, :]
+    _, C_largest = tip_force.from_efforts(J, largest, tip_force.covariance(largest, rho))
+    raised = u * np.sqrt(np.einsum("ni,nij,nj->n", u, C_largest, u))[:, None]
+    C_peak = C + sum(x[:, :, None] * x[:, None, :] for x in (lost, raised))
     sigma, axes = tip_force.sigma_ellipsoid(C_peak)
     share = np.einsum("nki,ni->nk", axes, lost) / np.maximum(sigma, np.finfo(float).tiny)
     return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes)), lost
