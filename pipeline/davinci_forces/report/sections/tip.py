@@ -134,8 +134,8 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     marks = (
         line(path[few], "path of the tip", "grey"),
         line(strokes(here, ends), "largest force", "vermillion", arrow=True),
-        line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
         Points3D(x, y, z, "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))),
+        line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
     )
     caption = explanation("tip-space", log=literal(force.log), scale=Number(1e3 * per_newton, "mm", digits=2))
     alt = f"The path of the tip in space in {literal(force.log)}, with the largest force of each contact as an arrow."
