@@ -27,7 +27,7 @@ from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
 LEGEND = (
-    "new path: share of the run's motion that is unlike any fitted path; ceiling: largest R2 that noise allows; "
+    "new path: share of the run's motion that is unlike any fitted path; ceiling: R2 of an exact model; "
     "coverage: of the 95 % band"
 )
 HEADER = (

@@ -260,16 +260,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level",
         "Alarm level", *sought, "Coverage",
     )  # fmt: skip
-    caption = (
-        "Trust in the estimates, in the worst logs that no fit used, if there are any. The columns New path to Ceiling "
-        "are of the joint's log with the largest model error. Detection level is of the log in which it is highest, "
-        "and Coverage of the log in which it is lowest. New path: share of the run's motion that is unlike any fitted "
-        "path; above 10 %, it tests the model. Model error: RMS of measured minus modelled effort, both low-passed, "
-        "without noise. Relative error: model error over the RMS of the measured effort; $R^2$ includes the noise. "
-        "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are lower; it judges "
-        "stated windows. Alarm level: above it, a contact is found that nobody stated. Coverage: share of free-space "
-        "samples in the stated 95 % error band. ± is one standard error."
-    )
+    caption = parts.explanation("trust")
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
 
