@@ -87,6 +87,7 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
         "rate": RATE,
         "R": [R_q, R_dq],
         "Q": Q,
+        "least_velocity": 1e-3,
         "initial_std": 0.7,
         "band": band,
         "alarm_level": 0.02,

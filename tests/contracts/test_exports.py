@@ -8,16 +8,18 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest, BadRobot
 from davinci_forces.exports import FORMATS, renderer, urdf
-from davinci_forces.exports.identified import SAFETY, export_of
+from davinci_forces.exports.identified import SAFETY, export_of, least_velocity
 from davinci_forces.filters import DEFAULT
+from davinci_forces.identification.regression import motion_at
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import pseudo_inertias
 from davinci_forces.maths.models.memory import efforts
+from davinci_forces.maths.signals.smoothing import measured_motion
 from davinci_forces.records import Choice, FreeSpace, JointModel, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
@@ -213,6 +215,33 @@ def test_the_json_of_a_study_predicts_what_the_study_predicted(small, catalogue)
 
 def test_the_c_of_a_study_gives_the_study_s_numbers_along_every_log(small, tmp_path):
     assert same_along_logs(small, tmp_path) > 1000
+
+
+@pytest.mark.parametrize("velocity", ["logged", "derived"])
+def test_a_velocity_is_0_in_a_log_below_the_least_velocity_after_the_low_pass_of_the_settings(velocity):
+    """The rule of the header: at that low-pass, whatever the cutoff of a fit, and without its lag."""
+    m = tested_arm.motion(replace(tested_arm.signal(), velocity=velocity))
+    logged = m.dq_measured if velocity == "logged" else None
+    dq = measured_motion(m.q_measured, logged, m.segment, m.rate, m.cutoff)[1]
+    assert not m.standing.any()
+    assert_array_equal(m.dq == 0.0, np.abs(dq) < least_velocity(m))
+    assert_array_equal(m.dq == 0.0, motion_at(m, 5.0, 0.02).dq[:, 0] == 0.0)
+    assert (m.dq == 0.0).any()
+
+
+def test_the_header_states_cutoff_lag_least_velocity_and_alarm_level_with_their_units(small, catalogue):
+    header = renderer("c")(small).files["model.h"]
+    for joint in small.joints:
+        motions = catalogue.select(Motion, joint=joint.name)
+        free = [m for m in motions if m.role in ("identification", "validation") and not m.at_rest]
+        of_logs, row, unit = [least_velocity(m) for m in free], joint.model.efforts.index(joint.name), joint.joint.unit
+        assert (
+            f" *   {joint.name}: cutoff {joint.fit.cutoff[row]:g} Hz, lag {joint.fit.effort_lag[row]:g} s, dq 0 below "
+            f"{np.median(of_logs):.3g} {unit('{position}/s')}, alarm level {joint.filter['alarm_level']:.6g} "
+            f"{unit('{effort}')}\n"
+        ) in header
+    quiet = small.joints[0]._replace(filter=small.joints[0].filter | {"alarm_level": None})
+    assert "s, no alarm level\n" in renderer("c")(replace(small, joints=(quiet,))).files["model.h"]
 
 
 def mistakes(schema, value, place=""):

@@ -44,15 +44,22 @@ def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:
          len(terms[i]), f"TERMS_{i}", [*joint["validity"].values()], *_filter(joint["filter"])]
         for i, joint in enumerate(joints)
     ]  # fmt: skip
-    lines = (f" *   {j['name']}: {j['motion']['cutoff']:g} Hz, {j['motion']['effort_lag']:g} s" for j in joints)
     return {
-        "PROCESSING": "\n".join(lines), "COORDINATES": ", ".join(coordinates), "N": str(len(coordinates)),
+        "PROCESSING": "\n".join(map(_processing, joints)),
+        "COORDINATES": ", ".join(coordinates), "N": str(len(coordinates)),
         "JOINTS": ", ".join(f"DF_{joint['name'].upper().replace('-', '_')}" for joint in joints),
         "STATES": str(max(map(len, terms))), "GRAVITY": _text(document["gravity"]), "UP": _text(chain["up"]),
         "LINKS": str(len(links)), "CHAIN": _text(list(map(_link, links))), "BODIES": _text(bodies),
         "TERMS": "\n".join(f"static const Term TERMS_{i}[] = {_text(of_joint)};" for i, of_joint in enumerate(terms)),
         "MODEL": ",\n".join(map(_text, rows)), "HEAD": "\n".join(f" * {line}" for line in head),
     }  # fmt: skip
+
+
+def _processing(joint: Mapping[str, Any]) -> str:
+    motion, online, units = joint["motion"], joint["filter"], joint["units"]
+    least, level = f"dq 0 below {online['least_velocity']:.3g} {units['velocity']}", online["alarm_level"]
+    alarm = f"alarm level {level:.6g} {units['effort']}" if level else "no alarm level"
+    return f" *   {joint['name']}: cutoff {motion['cutoff']:g} Hz, lag {motion['effort_lag']:g} s, {least}, {alarm}"
 
 
 def _terms(model: Mapping[str, Any], joint: str) -> list[Any]:

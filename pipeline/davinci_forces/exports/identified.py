@@ -20,6 +20,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, inertia, offset, stiffness
+from davinci_forces.maths.signals.smoothing import NORMAL_MAD, share_passed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, calibrate
 from davinci_forces.records import Choice, ErrorBand, FilterNoise, Fit, FreeSpace, Motion, StreamLevel
 from davinci_forces.records.catalogue import Catalogue
@@ -240,6 +241,11 @@ def free_spaces(catalogue: Catalogue, joint: str) -> list[FreeSpace]:
     return [space for space in spaces if space.role != "identification"] or spaces
 
 
+def least_velocity(m: Motion) -> float:
+    """The low-passed velocity of a log, below which its sign is not known; see `standstill.without_doubtful_signs`."""
+    return NORMAL_MAD * m.sigma_dq * (share_passed(m.rate, m.cutoff) ** 0.5 if m.velocity == "logged" else 1.0)
+
+
 def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Motion]) -> dict[str, Any] | None:
     """The default filter of a joint with its band and its alarm level, as far as free motion gives them.
 
@@ -255,6 +261,7 @@ def _filter(study: Study, catalogue: Catalogue, joint: Joint, free: Sequence[Mot
         levels += [stream.alarm_level for stream in catalogue.select(StreamLevel, joint=joint.name)]
         return {
             "rate": rate, "R": [R_q, R_dq], "Q": [[Q_qq, Q_qd, 0.0], [Q_qd, Q_dd, 0.0], [0.0, 0.0, Q_tau]],
+            "least_velocity": float(np.median([least_velocity(m) for m in free if not m.at_rest])),
             "initial_std": float(np.mean([np.std(motion.tau) for motion in free if not motion.at_rest])),
             "band": next(({"edges": b.edges.tolist(), "factor": b.factor.tolist(), "model_variance": b.model_variance}
                           for b in bands), None),

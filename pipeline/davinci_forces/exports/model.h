@@ -6,8 +6,8 @@
  * each filtered and delayed by the cutoff and the lag of the joint that is computed.
  * What a sample holds, for each joint with its own cutoff and lag, which are below:
  *   q            position after the low-pass
- *   dq           central difference of q, or the measured velocity after the same low-pass; 0 where it is below its
- *                noise, so that its sign is unknown (in logs: the column dq of the record JointModel)
+ *   dq           central difference of q, or the measured velocity after the same low-pass; 0 where its sign is
+ *                unknown (in logs: the column dq of the record JointModel)
  *   ddq          central difference of dq, before that
  *   q_measured   position without low-pass
  *   dq_measured  measured velocity without low-pass; if only positions are measured, the central difference of the
@@ -15,10 +15,18 @@
  *   tau          effort, less what is there without contact, as the offset of a day
  * In a log, the low-pass is a Butterworth filter of order 4, run forwards and backwards: no delay, half the amplitude at
  * the cutoff, none of it if the cutoff is at least 0.4 DF_RATE.  The effort lags the motion, so all but tau are delayed by
- * the lag; if that is negative, tau is delayed by its size instead.
+ * the lag, or advanced by its size if it is negative; tau stays where it is.
  * In a controller, low-pass by a filter without later samples, which delays q by some D.  Delay q_measured and
- * dq_measured by D, too, and tau by D minus the lag.  The standard deviation leaves out what such a delay costs.
- * Cutoff, lag:
+ * dq_measured by D, too, and tau by D minus the lag: tau is then late by the size of a negative lag, which is the same
+ * as all else being early.  The standard deviation and the alarm level leave out what such a delay costs, so free motion
+ * can exceed the level often.  Take the largest |tau_ext| of free motion in your controller as the level instead.
+ * In a log, dq is 0 where the velocity after a low-pass at @LOWPASS@ Hz, not delayed by the lag, is below 0.6745 standard
+ * deviations of its noise.  At standstill it is 0 up to 6 of them, or up to L / (1 s) if that is more.  Standstill is each
+ * second in which the position after that low-pass moves by less than L, and 1 / (@LOWPASS@ Hz) before and after it.  L is
+ * 1 % of rms(dq) (1 s), or 6 standard deviations of that position's noise if they are more, but at most 5 % of it.
+ * In a controller, set dq to 0 where that velocity at the time of q, or else dq itself, is below the one stated here, the
+ * median of the logs.  A sample with dq in place of 0, or 0 in place of dq, changes tau_hat by about the Coulomb friction.
+ * Of each joint:
 @PROCESSING@
  * df_gravity: all that holds a resting arm (weight, springs, offsets).  df_friction: for compensation, the model's minus
  * one standard error, never more than the motion loses.  Its memory of a displacement advances in df_step alone.  Both
