@@ -1,7 +1,5 @@
 """The model in C gives the numbers of the model in Python, and refuses what it must not use."""
 
-import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +12,7 @@ from davinci_forces.filters.problem import FilterInput
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.dvrk_psm import ROBOT as PSM
-from tests.compiled_model import AS_C, BAD, FLAGS, OK, OTHER_RATE, OUTSIDE, CompiledModel
-from tests.conftest import ROOT
+from tests.compiled_model import BAD, OK, OTHER_RATE, OUTSIDE, CompiledModel
 from tests.exported import NOISE, RATE, export, motion, motion_of
 
 ROBOTS = {"davinci": DAVINCI, "psm": PSM, "tilted": DAVINCI.with_base((0.3, -0.7, 0.2))}
@@ -76,22 +73,6 @@ def smooth(x: np.ndarray, share: float) -> np.ndarray:
     for value in x[1:]:
         late.append(late[-1] + share * (value - late[-1]))
     return np.array(late)
-
-
-def test_the_program_of_the_guide_runs(tmp_path):
-    code = (
-        (ROOT / "pipeline/davinci_forces/guide/how-to/export.md").read_text().partition("```c\n")[2].partition("```")[0]
-    )
-    for name, text in (renderer("c")(export(DAVINCI, "independent")).files | {"main.c": code}).items():
-        (tmp_path / name).write_text(text)
-    compiler = next((name for name in ("gcc", "clang") if shutil.which(name)), "")
-    if not compiler:
-        pytest.skip("no C compiler is installed, so that the program is not compiled")
-    build = [compiler, *AS_C, *FLAGS, "main.c", "model.c", "-lm", "-o", "main"]
-    subprocess.run(build, cwd=tmp_path, check=True)
-    tau_ext, std, contact = subprocess.check_output([tmp_path / "main"], text=True).split()
-    assert float(std) > 0.0
-    assert int(contact) == int(abs(float(tau_ext)) > 0.02)
 
 
 @pytest.mark.parametrize("structure", ["independent", "coupled"])

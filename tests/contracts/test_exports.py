@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -19,7 +21,7 @@ from davinci_forces.identification.regression import motion_at
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.maths.mechanics.bodies import pseudo_inertias
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.signals.smoothing import measured_motion
+from davinci_forces.maths.signals.smoothing import delay_segments, measured_motion
 from davinci_forces.records import Choice, FreeSpace, JointModel, Motion
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
@@ -27,7 +29,8 @@ from davinci_forces.robots.dvrk_psm import ROBOT as PSM
 from davinci_forces.robots.urdf import writing
 from tests import arm as tested_arm
 from tests import exported as exported_models
-from tests.compiled_model import same_along_logs
+from tests.compiled_model import FLAGS, same_along_logs
+from tests.conftest import ROOT
 from tests.exported import ORIGIN, RATE, export, motion
 
 
@@ -215,6 +218,72 @@ def test_the_json_of_a_study_predicts_what_the_study_predicted(small, catalogue)
 
 def test_the_c_of_a_study_gives_the_study_s_numbers_along_every_log(small, tmp_path):
     assert same_along_logs(small, tmp_path) > 1000
+
+
+@pytest.fixture(params=["independent", "coupled"])
+def recorded(request, small, lab, catalogue):
+    """An export with logs: of the small study, or of a fit of its arm with a cutoff and a lag of each joint."""
+    if request.param == "independent":
+        return small
+    rows, n = [], len(lab.study.robot.joints)
+    model = exported_models.coupled(lab.study.robot)
+    fit = exported_models.fit_of(model, "coupled", exported_models.possible(model))
+    fit = replace(fit, cutoff=(5.0, 17.0, 8.0)[:n], effort_lag=(0.0, -0.01, 0.013)[:n], logs=("arm",))
+    of_all = next(joint.filter for joint in small.joints if joint.filter)
+    for joint in lab.study.robot.joints:
+        signal = tested_arm.signal(joint.name, period=5.0, periods=2, rate=of_all["rate"], log="arm")
+        rows.append(tested_arm.motion(signal))
+    records = Catalogue(lambda kind: rows if kind is Motion else catalogue.records(kind))
+    joints = tuple(j._replace(fit=fit, model=model) for j in small.joints)
+    return replace(small, catalogue=records, joints=joints)
+
+
+def test_the_program_of_the_guide_finds_the_results_of_the_pipeline_in_the_table_of_samples(recorded, tmp_path):
+    guide = (ROOT / "pipeline/davinci_forces/guide/how-to/export.md").read_text()
+    [build, run] = re.findall(r"`((?:cc |\./main).*?)`", guide)
+    (tmp_path / "mine-c").mkdir()
+    files = renderer("c")(recorded).files
+    for name, text in files.items():
+        (tmp_path / "mine-c" / name).write_text(text)
+    (tmp_path / "main.c").write_text(guide.partition("```c\n")[2].partition("```")[0])
+    compiler = next((name for name in ("gcc", "clang") if shutil.which(name)), "")
+    if not compiler:
+        pytest.skip("no C compiler is installed, so that the program is not compiled")
+    subprocess.run([compiler, *FLAGS, *build.split()[1:]], cwd=tmp_path, check=True)
+    text = subprocess.check_output(run, cwd=tmp_path, text=True, shell=True)
+    samples, differences = int(text.split()[0]), [float(x) for x in text.split(":")[1].split()]
+    rows = [line for line in files["check.csv"].splitlines() if line[0].isdigit()]
+    assert samples == len(rows) >= 250 * len(recorded.joints)
+    size = max(abs(float(x)) for row in rows for x in (row.split(",")[2], *row.split(",")[-3:]))
+    assert max(differences) < 1e-12 * size
+    wrong = files["check.csv"].replace(rows[5], re.sub(r",[^,]*$", ",9", rows[5]))
+    (tmp_path / "mine-c" / "check.csv").write_text(wrong)
+    assert float(subprocess.check_output(run, cwd=tmp_path, text=True, shell=True).split()[-1]) > 1.0
+
+
+def test_the_table_of_samples_has_the_motion_at_the_low_pass_and_lag_of_each_joint(recorded):
+    """The samples by the functions of the signals alone, of all joints at the cutoff and lag of the one computed."""
+    lines = [line for line in renderer("c")(recorded).files["check.csv"].splitlines() if not line.startswith("#")]
+    columns, names = lines[0].split(","), [joint.name for joint in recorded.study.robot.joints]
+    table = np.array([line.split(",") for line in lines[1:]], float)
+    for i, joint in enumerate(recorded.joints):
+        rows = dict(zip(columns, table[table[:, 0] == i].T, strict=True))
+        row = joint.model.efforts.index(joint.name)
+        cutoff, lag = joint.fit.cutoff[row], joint.fit.effort_lag[row]
+        motions = recorded.catalogue.records(Motion)
+        [log] = {m.log for m in motions if m.joint == joint.name and np.isin(rows["tau"], m.tau).all()}
+        for name in names:
+            [m] = [m for m in motions if (m.log, m.joint) == (log, name)] or [None]
+            if name not in joint.model.joints:
+                assert not any(rows[f"{x}.{name}"].any() for x in ("q", "dq", "ddq"))
+                continue
+            at = np.searchsorted(m.t, rows["t"])
+            q, dq, ddq = measured_motion(m.q_measured, m.dq_measured, m.segment, m.rate, cutoff, lag)
+            for x, expected in {"q": q, "dq": np.where(m.dq == 0.0, 0.0, dq), "ddq": ddq}.items():
+                assert_allclose(rows[f"{x}.{name}"], expected[at], rtol=0, atol=1e-12 * np.abs(expected).max())
+            if name == joint.name:
+                shifted = delay_segments(m.q_measured, m.segment, lag * m.rate)
+                assert_allclose(rows["q_measured"], shifted[at], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("velocity", ["logged", "derived"])

@@ -1,23 +1,34 @@
 """The model as C99: inertia, bias, gravity, friction, predicted effort, and the step of the filter with its band."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from davinci_forces.errors import BadRequest
-from davinci_forces.exports.identified import Export, Rendering
+from davinci_forces.exports.identified import Export, ExportedJoint, Rendering
 from davinci_forces.files import read_bytes, text_of
+from davinci_forces.filters import DEFAULT, tracker
+from davinci_forces.filters.problem import FilterInput
+from davinci_forces.filters.response import noise_model
+from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
+from davinci_forces.maths.models.memory import efforts
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import COEFFICIENTS, Z_OF_MOTION
+from davinci_forces.maths.signals.smoothing import delay_segments
+from davinci_forces.records import FilterNoise, Motion
 
 KINDS = ("", "deflection", "smooth sign", "Stribeck", *Z_OF_MOTION)  # of z, in the order of `state` in model.c
 NO_BAND = {"edges": [inf] * 3, "factor": [1.0] * 4, "model_variance": 0.0}
+CHECKED = 400  # samples of a joint in check.csv
 NO_LINK = {"name": "", "parent": None, "coordinate": None, "prismatic": False, "placement": [[0.0] * 4] * 3}
 
 
 def render(export: Export) -> Rendering:
-    """Render model.h and model.c; raises BadRequest if a joint has no filter."""
+    """Render model.h, model.c and check.csv; raises BadRequest if a joint has no filter."""
     document = export.document()
     if missing := [joint["name"] for joint in document["joints"] if not joint["filter"]]:
         raise BadRequest(f"{export.study.name}: no identification log gives the noise of the filter of {missing[0]}")
@@ -28,7 +39,32 @@ def render(export: Export) -> Rendering:
     files = {name: text_of(read_bytes(Path(__file__).with_name(name))) for name in ("model.h", "model.c")}
     for key, value in values.items():
         files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
+    columns = (f"{x}.{name}" for x in ("q", "dq", "ddq") for name in document["coordinates"])
+    title = ("joint", "t", "tau", "q_measured", "dq_measured", *columns, "tau_hat", "tau_ext", "std_filter")
+    numbers = (f"{i},{','.join(map(repr, row))}" for i, j in enumerate(export.joints) for row in _checked(export, j))
+    files["check.csv"] = "\n".join([*(f"# {line}" for line in head), ",".join(title), *numbers, ""])
     return Rendering(files, export.remarks())
+
+
+def _checked(export: Export, joint: ExportedJoint) -> Iterator[list[float]]:
+    """Return samples from the middle of the first log of a joint's fit at the filter's rate, and their results."""
+    fit, model, online, names = joint.fit, joint.model, joint.filter or {}, [j.name for j in export.study.robot.joints]
+    row, T_s, catalogue = model.efforts.index(joint.name), 1.0 / online["rate"], export.catalogue
+    logs = (m for m in catalogue.select(Motion, joint=joint.name) if m.log in fit.logs and not m.at_rest)
+    for m in [m for m in logs if np.isclose(m.rate * T_s, 1.0, rtol=1e-6)][:1]:
+        half, late = len(m) // 2, fit.effort_lag[row] * m.rate
+        part = half + np.flatnonzero(m.segment[half : half + CHECKED] == m.segment[half])
+        q, dq, ddq, *_ = LogModels(export.identified, catalogue.select(Motion, log=m.log)).motion(fit, joint.name)
+        motion = ArmMotion(q[part], dq[part], ddq[part], T_s, m.segment[part])  # of the joints of the model
+        columns = np.zeros((3, len(part), len(names)))
+        columns[:, :, [names.index(name) for name in model.joints]] = motion[:3]
+        own, [tuned] = columns[2, :, names.index(joint.name)], catalogue.select(FilterNoise, joint=joint.name)
+        y_q, y_dq = (delay_segments(x, m.segment, late)[part] for x in (m.q_measured, m.dq_measured))
+        tau, dynamics = m.tau[part], model.joint_dynamics(fit.theta, motion)[row]
+        given = FilterInput(dynamics, y_q, y_dq, own, tau, T_s, online["initial_std"])
+        tracked = tracker(DEFAULT)(given, noise_model(tuned, joint.joint, T_s, export.study.settings.q_tau))
+        results = efforts(model, fit.theta, motion)[:, row], tracked.tau_ext, tracked.tau_ext_std
+        yield from np.column_stack([m.t[part], tau, y_q, y_dq, *columns, *results]).tolist()
 
 
 def _values(document: Mapping[str, Any], head: list[str]) -> dict[str, str]:
