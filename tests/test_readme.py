@@ -417,6 +417,16 @@ def test_words_that_users_look_up_lead_to_a_page_or_say_which_number_answers(top
     assert words in guide.page(topic).as_text
 
 
+@pytest.mark.parametrize(("name", "topic", "says"), [
+    ("JointModel", "records", "joint_model; predict; the model of one joint along one log"),
+    ("q_tau", "study", "random walk of the external effort"),
+])  # fmt: skip
+def test_a_name_of_the_reference_is_explained_by_the_tables_that_have_it(name, topic, says):
+    first = guide.page(name).as_text.split("\n\n")[0]
+    assert first.startswith(f"**`{name}`** (topic `{topic}`): ")
+    assert says in first.replace("`", "")
+
+
 def test_a_topic_that_is_a_notebook_names_its_file():
     with pytest.raises(BadRequest, match=r"from-arrays is a notebook; open .*from-arrays\.ipynb in Jupyter"):
         guide.page("from-arrays")

@@ -61,9 +61,9 @@ def pages() -> tuple[Page, ...]:
 
 
 def page(topic: str) -> Page:
-    """The page of a topic, or what the page of terms says of a term.
+    """The page of a topic, or what the page of terms says of a term, or the tables of other pages of a name.
 
-    Raises BadRequest if there is neither; it names the topics that hold these words, or are spelled most alike.
+    Raises BadRequest if there is none; it names the topics that hold these words, or are spelled most alike.
     """
     by_topic = {page.topic: page for page in pages()}
     words = rf"(?<!\w){re.escape(topic)}s?(?!\w)"
@@ -71,6 +71,11 @@ def page(topic: str) -> Page:
     rows = rows or re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text)
     if topic not in by_topic and rows:
         return replace(by_topic[TERMS], write=lambda: "\n\n".join(f"**{term}**:{means}" for term, means in rows))
+    named = re.compile(rf"(?m)^\| `{re.escape(topic)}` \|(.*)\|$")
+    rows = [(page.topic, row) for page in by_topic.values() for row in named.findall(page.text)]
+    if topic not in by_topic and rows:
+        lines = (f"**`{topic}`** (topic `{where}`): {row.replace(' |', ';').strip()}" for where, row in rows)
+        return replace(by_topic[rows[0][0]], write=lambda: "\n\n".join(lines))
     if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file() and topic not in by_topic:
         raise BadRequest(f"{topic} is a notebook; open {notebook} in Jupyter")
     if topic not in by_topic:
