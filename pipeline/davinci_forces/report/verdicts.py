@@ -1,18 +1,21 @@
 """All rules of the report: the limits of good, caution and problem."""
 
+import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.special import bdtr
 
+from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
 from davinci_forces.records.forces import MIN_COVERAGE
 from davinci_forces.records.weight import TorqueConstant, Weight
-from davinci_forces.report.content import Cell, Level
+from davinci_forces.report.content import Level
 from davinci_forces.report.content.number import Number, in_format
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
@@ -268,31 +271,7 @@ def percent(share: float) -> str:
     return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else in_format(round(100 * share), "d") + " %"
 
 
-def thresholds() -> tuple[tuple[Cell, ...], ...]:
+def thresholds() -> list[tuple[str, ...]]:
     """The rows of the table of thresholds: quantity, measure, and the bounds of good, caution and problem."""
-    return (
-        ("External effort of a joint, if the study states the `effort` sought", "detection level over this effort",
-         f"at most {percent(DETECTED)}", f"at most {percent(DETECTABLE)}", "beyond"),
-        ("External effort of a joint, if no `effort` is stated", "model error over the root mean square of the effort",
-         f"at most {percent(GOOD)}, on a path of which more than {percent(MIN_NEW_PATH)} was not fitted",
-         f"at most {percent(CAUTION)}, or tested only on the fitted path or mostly at rest", "beyond"),
-        ("95 % band of the external effort", "coverage: share of free-space samples in the band",
-         f"{percent(COVERED[0])} to {percent(COVERED[1])}",
-         f"above {percent(COVERED[1])}, and surely above 95 %: too wide",
-         f"below {percent(COVERED[0])}: too narrow"),
-        ("Stiffness of tissue", "standard error over stiffness",
-         f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",
-         f"at most {percent(ROUGH)}", "beyond, or no usable push"),
-        ("Mass", "standard error over stated mass",
-         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval or within {percent(SAME_MASS)}, from "
-         "joints that agree",
-         "beyond, or the joints contradict each other", "–"),
-        ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
-        ("Estimates of a simulated study",
-         "probability of so few within 2 (or 4) standard errors of the truth, if the errors are right",
-         f"at least {percent(UNLIKELY)}", "–", "below"),
-        ("White noise", "p-value of the Ljung-Box test over 20 lags", "above 1 %", "–", "–"),
-        ("Innovations of the filter", "p-values of this test and of the cumulative periodogram, both signals",
-         "each above 1 %, in the whole run or outside contact and reversals",
-         "below, with or without a known cause", "–"),
-    )  # fmt: skip
+    text = text_of(read_bytes(Path(__file__).with_name("thresholds.csv"))).format(**globals()).replace("%", " %")
+    return list(map(tuple, csv.reader(text.splitlines())))
