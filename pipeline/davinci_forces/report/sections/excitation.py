@@ -15,10 +15,8 @@ MOTION = {"q": "position", "dq": "velocity", "ddq": "acceleration"}
 @section_of("Excitation", "excitation", Excitation)
 def section(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     """Objectives and limits of every trajectory.  Fig 6.5, Table 6.1"""
-    yield Prose(
-        explanation("excitation")
-        + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
-    )
+    published = " The published ones are those of the thesis's Table 6.1." * context.compares_with_thesis
+    yield Prose(explanation("excitation") + published)
     rows, names = [], ("a0", "a1", "b1", "a2", "b2")
     for e in excitations:
         key = f"excitation.{e.joint}.{e.source}"

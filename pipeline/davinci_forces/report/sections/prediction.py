@@ -71,10 +71,7 @@ def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
     name, windows = parts.run_name(p), parts.spans(context.study.log(p.log).contact, "contact")
     error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
-    caption = (
-        f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
-        "and their difference."
-    )
+    caption = parts.explanation("prediction-figure", run=name, fit=fit_name(p.model, p.estimator))
     alt = f"{name}: the model error is {size}."
     panels = (
         parts.effort_panel(p, *windows),

@@ -19,10 +19,7 @@ def section(context: Context) -> Iterator[Block]:
     yield from paper_or_screen(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
-    yield Prose(
-        "Settings used, defaults included. `harmonics` = 0 keeps those of the robot and of the motion, and `q_tau` = 0 "
-        "takes the computed random walk; `effort` has the efforts that the study seeks:"
-    )
+    yield Prose(explanation("settings"))
     yield Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items()))
     if study.changed:
         yield Prose("Changes of the robot:")

@@ -5,7 +5,7 @@ from hashlib import sha256
 
 from davinci_forces.report.content import Block, Prose, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import RATINGS, paper_or_screen, section_of
+from davinci_forces.report.sections.parts import RATINGS, explanation, paper_or_screen, section_of
 from davinci_forces.study.review import STUDY, Rating
 
 
@@ -16,14 +16,8 @@ def section(context: Context) -> Iterator[Block]:
         return
     now = sha256(context.results.json()).hexdigest()
     old = [rating for rating in context.ratings if rating.results != now]
-    yield Prose(
-        "Reviewers rated figures and runs on the page of this report, or of an earlier one. Their ratings are stored "
-        "in `review.toml` beside study.toml, and are no part of the report's ID."
-    )
-    changed = (
-        f"The numbers have changed since {count(len(old), 'rating')} of {len(context.ratings)}: "
-        "`results.json` is not the one that was rated. Look again at the figures and runs of these ratings."
-    )
+    yield Prose(explanation("review"))
+    changed = explanation("review-changed", ratings=count(len(old), "rating"), total=len(context.ratings))
     same = "All ratings are of the numbers that this report shows."
     yield Verdict("warn", changed) if old else Verdict("info", same)
     rows = []

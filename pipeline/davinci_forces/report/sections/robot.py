@@ -9,7 +9,7 @@ from davinci_forces.report.content import Block, Figure3D, Prose, Table, literal
 from davinci_forces.report.content.marks import Colour, Line3D, Points3D
 from davinci_forces.report.content.number import MISSING
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import section_of, strokes
+from davinci_forces.report.sections.parts import explanation, section_of, strokes
 
 
 @section_of("The robot", "robot", Links)
@@ -20,17 +20,11 @@ def section(context: Context, records: list[Links]) -> Iterator[Block]:
     chain_kind = "a Denavit-Hartenberg chain" if tabulated else "a tree of links"
     moved_by = [coordinate for coordinate in links.moved_by.tolist() if coordinate]
     shared = len(set(moved_by)) < len(moved_by)
-    parallelogram = (
-        "The links of the parallelogram share a coordinate, so the tool pivots about a remote centre without a bearing "
-        "there. "
-    )
+    parallelogram = f"{explanation('robot-parallelogram')} " * shared
     unbounded = "has no bound: the Jacobian is singular within the joints' limits, or a joint has no limits."
     reach = unbounded if worst == MISSING else f"reaches {worst} within the joints' limits."
-    yield Prose(
-        f"The {literal(context.study.robot.title)} is modelled as {chain_kind}. {parallelogram if shared else ''}"
-        "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number, which can "
-        f"multiply the relative error of an effort, {reach}"
-    )
+    robot = literal(context.study.robot.title)
+    yield Prose(explanation("robot", robot=robot, kind=chain_kind, parallelogram=parallelogram, reach=reach))
     rows = []
     for link, parent, coordinate in zip(links.link, links.parent, links.moved_by, strict=True):
         mover = f"$q_{coordinate}$" if coordinate else "–"

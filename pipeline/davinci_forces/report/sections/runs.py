@@ -31,21 +31,15 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
     tuned = ", tuned as in [@filter-tuning]" if context.catalogue.records(FilterNoise) else ""
     tested = " Its innovations test whether it fits the data ([@innovations])."
-    yield Prose(
-        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}. "
-        "External efforts are those of its smoother, which uses the whole recording and has no delay."
-        + (tested if context.catalogue.records(Explanation) else "")
-    )
+    tested *= bool(context.catalogue.records(Explanation))
+    yield Prose(parts.explanation("runs", tuned=tuned, tested=tested))
     if at_rest := [t for t in tracks if t.at_rest]:
         largest = {t.joint: t for t in sorted(at_rest, key=lambda t: t.static_friction)}
         levels = [
             f"{context.size(largest[joint], 'static_friction', largest[joint].static_friction)} on "
             f"{name_in_sentence(joint)}" for joint in context.joints_of(at_rest)
         ]  # fmt: skip
-        yield Prose(
-            f"Joints at rest have no figures. At standstill friction takes any value up to its static level, and hides "
-            f"external efforts up to that level: {as_list(levels)}."
-        )
+        yield Prose(parts.explanation("runs-at-rest", levels=as_list(levels)))
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
@@ -130,10 +124,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
         yield Bullets(tuple(f"clock: {method}; velocity: {source}" for method, source in sources))
     if of_stages:
-        yield Prose(
-            "Remarks on study.toml, of the file readers and of the stages, the first of each kind; `davinci-forces "
-            "guide messages` explains them:"
-        )
+        yield Prose(parts.explanation("runs-remarks"))
         first = tuple(message(text) for _, text in first_of_each_kind(of_stages))
         yield Bullets(first)
         if len(first) < len(of_stages):

@@ -56,15 +56,9 @@ def correlations(forces: Sequence[TipForce]) -> str:
     """State the assumed correlation of the joints' errors."""
     correlated = [force for force in forces if force.correlation_from]
     if not correlated:
-        return (
-            "The joints' errors are taken as independent, because their correlation could not be estimated. That takes "
-            "at least two logs in free motion, besides the log itself, in which the errors correlate alike."
-        )
-    sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
-    return (
-        "The correlation of the joints' errors is estimated from the free motion of other logs; it is 0 where these "
-        f"logs disagree. Its largest value is {max(sizes):.2f}."
-    )
+        return explanation("tip-independent")
+    largest = max(max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated)
+    return explanation("tip-correlated", largest=f"{largest:.2f}")
 
 
 def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
@@ -93,11 +87,7 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
 def log_blocks(context: Context, force: TipForce) -> Iterator[Block]:
     """The figures of one log."""
     name, contacts = literal(force.log), context.catalogue.select(TipContact, log=force.log)
-    caption = (
-        f"{name}: force at the tip with its 95 % band."
-        f"{' Windows of contact are shaded.' if contacts else ''} Where a joint stands still, its friction "
-        "may take up any effort, so the band is wide."
-    )
+    caption = explanation("tip-time", log=name, shaded=" Windows of contact are shaded." * bool(contacts))
     alt = f"Components of the force at the tip over time in {name}."
     panels = tuple(component_panel(force, axis, contacts) for axis in "xyz")
     yield Figure(caption, alt, panels, f"tip-time-{force.log}", zoomable=True, height=32)

@@ -94,10 +94,7 @@ def force_figure(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     residual = Panel("Residual", "depth [mm]", "force [N]", (HLine(0.0), *in_and_out(typical, misfit)))
     why = "The stiffness of this push is nearest to that of the log." if tissue.pushes else "No push counts."
     third = "the distribution of the stiffness of pushes" if many else "its force on the way in and out (hysteresis)"
-    caption = (
-        f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
-        f"residual of the line; and {third}. {why}"
-    )
+    caption = explanation("tissue-force", log=name, push=typical.push, third=third, why=why)
     alt = f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}."
     panels = (line_panel(pushes, typical), residual, last)
     yield Figure(caption, alt, panels, f"tissue-{tissue.log}", columns=3, height=46)

@@ -111,14 +111,9 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
         effort = label(load, "tau_ext", "external effort")
         panels.append(Panel(title(load.joint), "time [s]", effort, (measured, caused)))
     plus = " plus the joint's offset of the day" if any(offsets.values()) else ""
-    caption = (
-        f"{name}: external effort {once} of each joint that carries the mass{subtracted}, and the effort of the {by} "
-        f"mass{plus}."
-    )
-    alt = (
-        f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
-        f"{Number(mass, 'kg')}."
-    )
+    caption = explanation("weight-figure", log=name, once=once, subtracted=subtracted, by=by, plus=plus)
+    joints = ", ".join(title(load.joint) for load in loads)
+    alt = f"{name}: the external effort of {joints} follows the load of {Number(mass, 'kg')}."
     return Figure(caption, alt, tuple(panels), f"weight-figure-{weight.log}", height=35)
 
 

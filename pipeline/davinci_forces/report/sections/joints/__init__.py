@@ -123,10 +123,9 @@ def parameters(context: Context, joint: str, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     # That of a fit to several joints would add efforts of several units.
     error = f" Mean squared error of the effort: {mse}." if fit.group == joint else ""
-    caption = (
-        f"Parameters of {name_in_sentence(joint)}. Model: {fit.model}. Estimator: "
-        f"{title_of(fit.estimator)}. Data: {literal(', '.join(fit.logs))}.{error}{scales(context, joint, fit)}{coupled}"
-    )
+    logs, more = literal(", ".join(fit.logs)), f"{error}{scales(context, joint, fit)}{coupled}"
+    source = f"Model: {fit.model}. Estimator: {title_of(fit.estimator)}. Data: {logs}."
+    caption = f"Parameters of {name_in_sentence(joint)}. {source}{more}"
     return Table(caption, ("Symbol", *PARAMETER_HEADER), table_rows, f"theta-{joint}", "lllrrrr")
 
 

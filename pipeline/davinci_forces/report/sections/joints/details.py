@@ -59,10 +59,7 @@ def convergence(context: Context, joint: str) -> Iterator[Figure]:
         Line(np.arange(1.0, len(s) + 1.0), s.best_mse, f"{s.walls} walls", WALLS.get(s.walls, "")) for s in searches
     )
     unit = label(searches[0], "best_mse", "mean squared error")
-    caption = (
-        f"{title(joint)}: the least mean squared error of the swarm after each iteration, of {searches[0].searched} "
-        f"parameters by {searches[0].particles} particles. The least error that the known signs allow: {ends}."
-    )
+    caption = explanation("joints-swarm", joint=title(joint), search=searches[0], ends=ends)
     alt = f"Squared error over iterations, falling until it stays: {ends}."
     panels = (Panel("", "iteration", unit, lines, x_log=True, y_log=True),)
     yield Figure(caption, alt, panels, f"swarm-{joint}", height=42)
