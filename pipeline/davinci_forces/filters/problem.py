@@ -11,6 +11,7 @@ from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import COEFFICIENTS, VISCOUS
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import JointModel, Track
+from davinci_forces.records.prediction import BIAS
 from davinci_forces.robots.robot import Kind, Robot
 
 
@@ -119,8 +120,7 @@ def filter_inputs(model: JointModel, tau_hat: Array | None = None, smooth: bool 
     `tau_hat` (N,) is the effort of another fit, to be subtracted instead of the model's effort.  The motion is that
     measured, or low-passed if `smooth`.
     """
-    gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
-    coefficients = (model.constant, *gravity, model.spring, *friction)
+    coefficients = tuple(getattr(model, name) for name in BIAS)
     T_s, initial_std = 1.0 / model.rate, float(np.std(model.tau)) or 1.0
 
     def read(start: int, rows: slice) -> FilterInput:

@@ -15,14 +15,12 @@ from davinci_forces.maths.periods.shift import likeness
 from davinci_forces.maths.signals.smoothing import delay_segments, segments
 from davinci_forces.maths.signals.standstill import speed_of
 from davinci_forces.records import Choice, Fit, FittedPaths, JointModel, Motion, Prediction
-from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
+from davinci_forces.records.prediction import ANOTHER_PATH, BIAS, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import ARM, model_of
 from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
 STATIC_FRICTION = ("Coulomb friction", "Stribeck friction")  # parameters that add up at standstill
-# Fields of a record with the coefficients of the bias, in the order of `maths.models.terms`.
-BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
 OUTSIDE_MARGIN = 0.05  # of the fitted range of positions, on either side
 MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest singular value are not refitted
 

@@ -8,6 +8,8 @@ from davinci_forces.records.recordings import FilteredMotion
 CHOSEN = "chosen"
 CHOSEN_BY_LOG = "chosen_by_log"  # the chosen model, refitted without whole logs instead of blocks of path
 SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
+# Fields of a `JointModel` with the coefficients of the bias, in the order of `maths.models.terms`.
+BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
 
 
 class Prediction(LogJointRecord):
