@@ -55,9 +55,10 @@ class Context:
         """The result of that key, which is a whole number, as a cell."""
         return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
 
-    def size(self, record: Record, field: str, value: float, digits: int = 2) -> str:
-        """A value of a record's field with its unit, as text for a sentence."""
-        return str(Number(value, format_unit(unit_of(record, field)), digits=digits))
+    def size(self, record: Record, field: str, value: float | None = None, digits: int = 2) -> str:
+        """The value of a record's field, or another value, with the field's unit, as text for a sentence."""
+        size = getattr(record, field) if value is None else value
+        return str(Number(size, format_unit(unit_of(record, field)), digits=digits))
 
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter used; a chosen fit is named `chosen.<fit>`."""

@@ -47,7 +47,7 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
     """The torque constants that known masses give, beside those that are used."""
     rows = []
     for constant in constants:
-        used = context.size(constant, "torque_constant_used", constant.torque_constant_used, 4)
+        used = context.size(constant, "torque_constant_used", digits=4)
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
         away = abs(constant.torque_constant - constant.torque_constant_used) / constant.torque_constant_std
         follows = "–" if math.isnan(away) else "keep" if away <= NORMAL_95 else "check"
