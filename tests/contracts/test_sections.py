@@ -150,7 +150,7 @@ def test_a_study_that_has_everything_has_the_section(name: str, full: Context):
 
 def test_every_explanation_is_used_with_the_values_of_its_braces():
     given = {}
-    for source in Path(parts.__file__).parent.rglob("*.py"):
+    for source in Path(parts.__file__).parents[1].rglob("*.py"):
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func).removeprefix("parts.") == "explanation":
                 given[ast.literal_eval(node.args[0])] = {value.arg for value in node.keywords}

@@ -11,6 +11,7 @@ from davinci_forces.report.content.marks import AnyMark, Band, HLine, Points
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.context import count, title
 from davinci_forces.report.results import format_unit
+from davinci_forces.report.sections.parts import explanation
 from davinci_forces.report.verdicts import band, verdict_words
 from davinci_forces.report.writers import render_all
 
@@ -36,13 +37,8 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
     dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if findings.by_date else ""
     undated = " Some logs state no date of recording, so studies are in the order in which they are named."
     order = "" if findings.by_date else undated
-    yield Prose(
-        f"This page compares {count(len(studies), 'report')}{dates}; each row links to its report.{order} Parameters "
-        "are least-squares estimates of each joint by itself. A number drifts if a weighted line through it has "
-        "a slope beyond the standard error of the slope, which is widened if values scatter. A number varies if its "
-        "values scatter about one mean by more than their errors. A study stands out if it is far from the mean of the "
-        f"others. The chance of a false alarm in all {findings.tests} tests together is {100 * findings.chance:.0f} %."
-    )
+    reports, chance = count(len(studies), "report"), 100 * findings.chance
+    yield Prose(explanation("campaign", reports=reports, dates=dates, order=order, tests=findings.tests, chance=chance))
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
         yield Verdict("info", f"Left out, as they have no results: {names}. Run `davinci-forces all` on them.")
@@ -104,11 +100,7 @@ def joint_section(
     changed = sorted({series.name for series in of_joint if series.key in changing})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
     drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
-    caption = (
-        f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. The line is "
-        f"the weighted mean. Grey: control limits, which {100 * findings.inside:.1f} % of further values in control "
-        "keep. Studies that stand out are named."
-    )
+    caption = explanation("campaign-joint", joint=title(joint), inside=100 * findings.inside)
     alt = f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}."
     panels = tuple(panel(series, findings) for series in drawn)
     figure = Figure(caption, alt, panels, f"campaign-{label}", columns=2, height=34)

@@ -146,10 +146,7 @@ def reason(entry: LogEntry, track: Track | None, is_fitted: bool) -> str:
     if track is None:
         return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:
-        return (
-            "at rest, where friction takes any value up to its static level and hides efforts up to that level; move "
-            "the joint"
-        )
+        return explanation("contacts-at-rest")
     if entry.role != "contact":
         return f"a log of role “{entry.role}” is tracked, but its windows are not measured"
     return "nothing stands out above the alarm level; write `contact = [[start, end]]` if there was a contact"

@@ -54,9 +54,8 @@ def section(context: Context) -> Iterator[Block]:
     figures: list[Figure] = []
     for log in context.study.truth.get("log", []):
         for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
-            curve = {
-                "External effort": ("tau_ext_smooth", [push for push in log["push"] if push.get("joint") == joint])
-            }
+            pushes = [push for push in log["push"] if push.get("joint") == joint]
+            curve = {"External effort": ("tau_ext_smooth", pushes)}
             for track in context.catalogue.select(Track, log=log["name"], joint=str(joint)):
                 figures.append(compared_figure(track, f"{run_name(track)}: external effort", "external effort", curve))
     tip = list(tip_forces(context))

@@ -13,14 +13,7 @@ from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import (
-    chapters,
-    explanation,
-    grade_of_mass,
-    of_joint,
-    section_of,
-    trust,
-)
+from davinci_forces.report.sections.parts import chapters, explanation, grade_of_mass, of_joint, section_of, trust
 from davinci_forces.report.verdicts import percent, thresholds
 
 BIBLIOGRAPHY = Path(__file__).with_name("references.bib")

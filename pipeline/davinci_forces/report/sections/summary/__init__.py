@@ -118,12 +118,10 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
     unstated = sum(len(contact) for contact in contacts) - stated
     contacts_above = f"{count(unstated, 'contact')} found above"
-    text = (
-        f"External effort is what the robot exerts on its environment, the opposite of a push on it: "
-        f"{efforts_in_words(context)}. It was estimated on {count(len(joints), 'joint')} of the "
-        f"{literal(context.study.robot.title)}, in {len(logs)} of {count(len(context.study.logs), 'log')}."
-        f"{opening.currents_in_words(context)}"
-    )
+    joints_of_robot = f"{count(len(joints), 'joint')} of the {literal(context.study.robot.title)}"
+    some_logs = f"{len(logs)} of {count(len(context.study.logs), 'log')}"
+    text = parts.explanation("answer", efforts=efforts_in_words(context), joints=joints_of_robot, logs=some_logs)
+    text += opening.currents_in_words(context)
     if not contacts:
         roles = {log.role for log in context.study.logs}
         why = "pushes are in [@tissue]" if context.catalogue.records(Stiffness) else "no log has the role contact"
@@ -132,9 +130,8 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
         return f"{text} No contact is measured: {why}."
     peaks = peaks_in_words(context, contacts)
     small = sum(int(verdicts.is_small(contact).sum()) for contact in contacts)
-    doubt = f" {count(small, 'peak')} below twice the alarm level may be due to the model: see [@contacts]." * (
-        small > 0
-    )
+    doubt = f" {count(small, 'peak')} below twice the alarm level may be due to the model: see [@contacts]."
+    doubt *= small > 0
     if not stated:
         level = "the alarm level, which free motion crosses at most once in ten minutes"
         return f"{text} **{contacts_above} {level}; the study states no window of contact.{peaks}**{doubt}"
@@ -170,9 +167,7 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
         for of, row in above
     ]
     text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
-    sought = {
-        track.joint for track in context.catalogue.records(Track) if context.study.log(track.log).role == "contact"
-    }
+    sought = {track.joint for track in context.catalogue.select(Track, role="contact")}
     levels = [
         f"{name_in_sentence(t.joint)} above {context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)}"
         for t in context.catalogue.records(Threshold)
@@ -206,11 +201,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
     of_contact = [log for log in by_error if context.study.log(log).role == "contact"] or by_error
     logs = [log for log in of_contact if len(touched[log]) == 1] or of_contact
-    untouched = [
-        t.log
-        for t in context.catalogue.select(Track, joint=trusted.joint)
-        if context.study.log(t.log).role == "contact"
-    ]
+    untouched = [track.log for track in context.catalogue.select(Track, joint=trusted.joint, role="contact")]
     logs = logs or untouched[:1] or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         stated = parts.spans(context.study.log(track.log).contact, colour=TOUCHED)

@@ -11,7 +11,7 @@ from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import literal, message
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import grade_of_mass, of_joint, scored_predictions
+from davinci_forces.report.sections.parts import explanation, grade_of_mass, of_joint, scored_predictions
 from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 
 # Warnings of the measured motion, on which all else rests, and of the scale of efforts
@@ -145,12 +145,9 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
         return
     impossible = [verdicts.is_impossible(*of) for of in zip(fit.theta, fit.theta_std, strict=True)]
     if wrong := [name for i, name in of_joint(fit, joint).items() if fit.positive[i] and impossible[i]]:
-        text = f"the model in use has a negative {as_list(wrong)}, which no mechanism has. It predicts the effort as "
-        text += "this page says. For simulation or compensation choose parameters that a mechanism can have: in "
-        text += "study.toml, `fit = 'independent.consistent'`."
+        text = explanation("negative", parameters=as_list(wrong))
         if LIFTED_MASS in wrong:
-            text = "its lifted mass is negative. Unless a counterweight lifts it, its positive direction and the sign "
-            text += f"of its efforts are not those of the robot's chain: in study.toml {verdicts.TURN_AROUND}."
+            text = explanation("negative-mass", remedy=verdicts.TURN_AROUND)
         yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
@@ -177,8 +174,7 @@ def looks_at_narrow_bands(context: Context, trusts: list[Trust]) -> Iterator[tup
     shares = as_list([percent(space.coverage) for _, space in narrow])
     text = f"**{where}**: the 95 % band is too narrow: it covers only {shares} of free-space samples."
     if not all(t.share > verdicts.CAUTION for t, _ in narrow):  # else more logs do not calibrate it: the model is wrong
-        text += " More logs of free motion (role validation), at these speeds and on other days, calibrate it; "
-        text += "until then, judge an effort by the alarm level."
+        text += f" {explanation('narrow-band')}"
     others = (
         offset_remedy(context, p)
         for t, space in narrow
