@@ -53,10 +53,12 @@ class Library:
         """The number of joints that move together in each log, by the log's number."""
         return {log.number: int(log.is_moving.sum()) for log in self.logs}
 
-    def columns(self, model: Model) -> list[int]:
-        """Return the indices of the parameters of a model with some of the terms."""
+    def part(self, model: Model, strength: float = 0.0, weights: Array | None = None) -> "CandidatePart":
+        """Return a model with some of the terms, and a ridge; efforts have `weights` (m,), or the weight 1."""
         numbers = {identity(parameter): i for i, parameter in enumerate(self.model.parameters)}
-        return [numbers[identity(parameter)] for parameter in model.parameters]
+        columns = [numbers[identity(parameter)] for parameter in model.parameters]
+        ridge = Ridge(strength, np.ones(1) if weights is None else weights, self.combination)
+        return CandidatePart(model, self, columns, ridge)
 
 
 def identity(parameter: Parameter) -> tuple[str, float]:
@@ -201,14 +203,13 @@ def variants(
         variant = f"{structure}+{friction.variant}".removesuffix("+")
         added = str(friction) if friction.variant else ""
         parts = []
-        for part in libraries:
-            terms = {effort: friction.terms(reaches[effort]) for effort in part.model.efforts}
-            if isinstance(part.model, CoupledArm):
-                model: Model = coupled_joints(robot, part.model.rows, terms, variant)
+        for every in libraries:
+            terms = {effort: friction.terms(reaches[effort]) for effort in every.model.efforts}
+            if isinstance(every.model, CoupledArm):
+                model: Model = coupled_joints(robot, every.model.rows, terms, variant)
             else:
-                model = independent(robot.joint(part.model.group), terms[part.model.group], variant)
-            ridge = Ridge(0.0, np.ones(1) if weights is None else weights, part.combination)
-            parts.append(CandidatePart(model, part, part.columns(model), ridge))
+                model = independent(robot.joint(every.model.group), terms[every.model.group], variant)
+            parts.append(every.part(model, weights=weights))
         for strength in RIDGES[structure]:
             name = f"{structure}{'+' * bool(added)}{added}{separate}{ridge_name(strength)}"
             models.append(Candidate(name, variant, added, tuple(part.with_ridge(strength) for part in parts)))

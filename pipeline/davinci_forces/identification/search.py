@@ -16,7 +16,7 @@ from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term, presliding_friction, smooth_sign, stribeck
-from davinci_forces.maths.selection import CLEARLY, CrossValidation, LeftOut, Ridge, schemes_of, standard_error
+from davinci_forces.maths.selection import CLEARLY, CrossValidation, LeftOut, schemes_of, standard_error
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Kind, Robot
@@ -93,18 +93,16 @@ class JointSearch:
         key = processing, terms
         if key not in self._steps:
             equations = self.library(processing, among or terms)
-            columns = equations.columns(joint_model(self.robot, self.joint, self.structure, terms))
+            part = equations.part(joint_model(self.robot, self.joint, self.structure, terms))
             together = [equations.joints_moving[log.number] for log in self.logs]
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, together)
-            cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
-            left_out, steps = LeftOut(cells, self._schemes, scored), []
+            left_out, steps = LeftOut(part.by_block, self._schemes, part.score_cells), []
             for strength in neighbours(RIDGE_GRID, near) if near else RIDGE_GRID:
-                ridge = Ridge(strength, np.ones(1), equations.combination)
                 try:
-                    errors = left_out.cross_validate(ridge)
+                    errors = left_out.cross_validate(part.with_ridge(strength).ridge)
                 except np.linalg.LinAlgError:
                     continue
-                steps.append(Step(name, processing, terms, strength, len(columns), errors))
+                steps.append(Step(name, processing, terms, strength, len(part.columns), errors))
             self._steps[key] = min(steps, key=lambda step: step.score, default=None) if self._schemes else None
         step = self._steps[key]
         return step._replace(name=name) if step else None
@@ -271,8 +269,8 @@ def shared_part(
     processing = {search.joint: search.chosen.processing for search in searches}
     by_joint = tuple(processing.get(joint, arm[0].processing[0]) for joint in joints)
     model = coupled_joints(robot, [joints.index(search.joint) for search in searches], terms, CHOSEN)
-    equations = candidates.library(model, [log._replace(processing=by_joint) for log in arm], count)
-    return CandidatePart(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
+    processed = [log._replace(processing=by_joint) for log in arm]
+    return candidates.library(model, processed, count).part(model, weights=weights)
 
 
 def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], count: int) -> CandidatePart:
@@ -280,9 +278,7 @@ def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], 
     step = search.chosen
     model = joint_model(robot, search.joint, search.structure, step.terms)
     processed = [log._replace(processing=(step.processing,) * len(log.records)) for log in logs]
-    equations = candidates.library(model, processed, count)
-    ridge = Ridge(step.strength, np.ones(1), equations.combination)
-    return CandidatePart(model, equations, equations.columns(model), ridge)
+    return candidates.library(model, processed, count).part(model, step.strength)
 
 
 def describe_terms(searches: Sequence[SearchResult]) -> str:
