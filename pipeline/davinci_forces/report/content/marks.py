@@ -29,24 +29,26 @@ def _column(values: Any) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Line(Mark):
-    """A curve through samples; NaN interrupts it."""
+class Samples(Mark):
+    """Samples of y over x; the label is their entry in the legend."""
 
     x: Array
     y: Array
     label: str = ""
     colour: Colour = ""  # "" takes the next of the palette
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Samples):
+    """A curve through samples; NaN interrupts it."""
+
     style: Style = ""  # "" takes the next style, so that lines of a panel differ without colours, too
 
 
 @dataclass(frozen=True, eq=False)
-class Points(Mark):
+class Points(Samples):
     """Separate points; if given, each point has an error bar of +- `y_std` and a name next to it."""
 
-    x: Array
-    y: Array
-    label: str = ""
-    colour: Colour = ""
     y_std: Array | None = None
     names: tuple[str, ...] = ()
 
@@ -68,13 +70,8 @@ class Band(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Stems(Mark):
+class Stems(Samples):
     """A stem from zero to each value, as an autocorrelation is drawn."""
-
-    x: Array
-    y: Array
-    label: str = ""
-    colour: Colour = ""
 
 
 @dataclass(frozen=True, eq=False)
