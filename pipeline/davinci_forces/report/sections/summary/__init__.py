@@ -198,7 +198,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     contacts = context.catalogue.select(Contact, joint=trusted.joint)
     errors = {p.log: p.model_error for p in parts.scored_predictions(context, trusted.joint)}
     touched = {c.log: [d for d in context.catalogue.select(Contact, log=c.log) if d.above.any()] for c in contacts}
-    by_error = sorted(touched, key=lambda log: (context.study.log(log).role == "contact", errors.get(log, 0.0)))
+    by_error = sorted(touched, key=lambda log: errors.get(log, 0.0))
     of_contact = [log for log in by_error if context.study.log(log).role == "contact"] or by_error
     logs = [log for log in of_contact if len(touched[log]) == 1] or of_contact
     untouched = [track.log for track in context.catalogue.select(Track, joint=trusted.joint, role="contact")]
