@@ -253,7 +253,7 @@ class IdentifiedArm:
         raise BadRequest("an IdentifiedArm keeps its logs in a temporary folder and cannot be pickled; use `save`")
 
     def plot(self) -> Any:
-        """Plot measured and modelled effort of the fitted logs, one after another; returns the axes, one a joint."""
+        """Plot measured and modelled effort of all given logs, one after another; returns the axes, one a joint."""
         axes = axes_of({joint: self._effort_label(joint) for joint in self.fits})
         for ax, joint in zip(axes, self.fits, strict=True):
             shift = 0.0

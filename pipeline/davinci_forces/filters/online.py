@@ -299,8 +299,8 @@ def _state(term: TermValue, memory: float, q: float, dq: float) -> float:
 class Stream:
     """The external efforts of an arm from samples as they arrive: `step(t, q, tau)`.
 
-    `model` is the content of an exported model.json.  `coordinates` are the joints that `q`, `tau` and `dq` are over,
-    and `joints` those with estimates.  `rate` [Hz] is that of the samples, and `delay` [s] that of the estimate.
+    It is made of the content of an exported model.json.  `coordinates` are the joints that `q`, `tau` and `dq` are
+    over, and `joints` those with estimates.  `rate` [Hz] is that of the samples, and `delay` [s] that of the estimate.
     `offset` is an effort per joint that is subtracted, 0 unless it is set.
 
     Raises ValueError if a joint has no filter, or joints have different rates.

@@ -14,7 +14,7 @@ from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
 from davinci_forces.records.forces import MIN_COVERAGE
-from davinci_forces.records.weight import TorqueConstant, Weight
+from davinci_forces.records.weight import SAME_MASS, TorqueConstant, Weight
 from davinci_forces.report.content import Level
 from davinci_forces.report.content.number import Number, in_format
 
@@ -22,7 +22,6 @@ GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measu
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
 TURN_AROUND = "write `sign = -1` with its position, velocity and effort, all three"
-SAME_MASS = 0.01  # share of a stated mass: torque constants are not known better
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
 # Share of a path's variance that no fitted path explains; the stage `predict` uses the same limit.

@@ -183,7 +183,7 @@ def proposal(record: TorqueConstant, joint: Joint) -> str:
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
     away = abs(value - used) / std
-    verdict = "which agrees" if away <= NORMAL_95 else "which differs: check mass, position, gear and motor"
+    verdict = "which agrees" if record.agrees else "which differs: check mass, position, gear and motor"
     return f"{text}; {used:g} is used, {away:.1f} standard errors away, {verdict}; the proposal is not applied"
 
 

@@ -8,7 +8,7 @@ from textwrap import fill
 
 from davinci_forces.estimators import title_of
 from davinci_forces.files import read_bytes, text_of
-from davinci_forces.records import KINDS, Fit, LogSummary, Weight
+from davinci_forces.records import KINDS, Fit, LogSummary, Motion, Weight
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
@@ -76,10 +76,12 @@ def paragraph_for_paper(context: Context) -> str:
         + " (and gave a torque constant in use)" * (grade_of_mass(context, weight)[1] == "taken")
         for weight in context.catalogue.records(Weight) if isfinite(weight.stated_mass)
     ]  # fmt: skip
+    is_logged = any(motion.velocity == "logged" for motion in context.catalogue.records(Motion))
     paragraph = explanation(
         "paper",
         arm=f"{'a simulated arm' if context.study.simulated else 'an arm'} ({robot.title})",
         efforts=efforts_in_words(context),
+        motion="joint positions and velocities" if is_logged else "joint positions",
         version=f"{context.provenance.version} (code {context.provenance.code})",
         data="; and from ".join(data_in_words(context, [*fits])),
         chosen="selected by cross-validation over blocks of path" if settings.fit == CHOSEN else settings.fit,

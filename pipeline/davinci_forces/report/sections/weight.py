@@ -5,7 +5,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Load, TorqueConstant, Weight
 from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import Line
@@ -49,8 +48,7 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
     for constant in constants:
         used = context.size(constant, "torque_constant_used", digits=4)
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
-        away = abs(constant.torque_constant - constant.torque_constant_used) / constant.torque_constant_std
-        follows = "–" if math.isnan(away) else "keep" if away <= NORMAL_95 else "check"
+        follows = "–" if math.isnan(constant.torque_constant_used) else "keep" if constant.agrees else "check"
         rows.append((*run_cells(constant), str(Number(constant.stated_mass, "kg")), used, proposed, follows))
     header = ("Log", "Joint", "Known mass", "Used", "Proposed", "In use")
     return Table(explanation("torque-constants"), header, rows, "torque-constants", "llrrrl")

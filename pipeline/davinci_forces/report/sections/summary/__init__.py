@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from davinci_forces.maths.arrays import Booleans
 from davinci_forces.records import Contact, Stiffness, Threshold, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
@@ -24,7 +25,9 @@ TOUCHED: Colour = "sky"  # of contact windows
 REST: Colour = "yellow"  # of standstill
 MAX_IN_COLUMN = 3  # panels below each other on page one
 MAX_PEAKS = 6  # contacts of which page one states each peak
-HELD = 0.9  # of its peak: the mean of the middle half of a push that is held; of a triangle it is three quarters
+# Of its peak: the mean of the middle half of a push that is held, and the least within the peak's error; a triangle's
+# is three quarters.
+HELD, MIN_HELD = 0.9, 0.85
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -129,9 +132,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
             why = "none was found, and the study states no window of contact"
         return f"{text} No contact is measured: {why}."
     peaks = peaks_in_words(context, contacts)
-    small = sum(int(verdicts.is_small(contact).sum()) for contact in contacts)
-    doubt = f" {count(small, 'peak')} below twice the alarm level may be due to the model: see [@contacts]."
-    doubt *= small > 0
+    doubtful = sum(int(is_doubtful(context, contact).sum()) for contact in contacts)
+    which = f" {count(doubtful, 'peak')} below twice the alarm level or in a log that identifies"
+    doubt = f"{which} may be due to the model: see [@contacts]." * (doubtful > 0)
     if not stated:
         level = "the alarm level, which free motion crosses at most once in ten minutes"
         return f"{text} **{contacts_above} {level}; the study states no window of contact.{peaks}**{doubt}"
@@ -147,12 +150,12 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
 def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     """State the peaks with their standard errors, logs and times: all if they are few, else the largest of each joint.
 
-    Small ones, which may be due to the model, are not named beside others.  Then name the joints of contact logs
+    Doubtful ones are not named beside others.  Then name the joints of contact logs
     without any, and the level below which a contact is missed.
     """
     every = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
-    above = [(contact, row) for contact, row in every if not verdicts.is_small(contact)[row]] or every
-    touched = {contact.joint for contact, _ in above}
+    touched = {contact.joint for contact, _ in every}
+    above = [(contact, row) for contact, row in every if not is_doubtful(context, contact)[row]] or every
     is_short = len(above) <= MAX_PEAKS
     if not is_short:
         by_size = sorted(above, key=lambda of: abs(of[0].peak[of[1]]))
@@ -176,10 +179,17 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     return f"{text} None on {as_list(levels)}." if peaks and levels else text
 
 
+def is_doubtful(context: Context, contact: Contact) -> Booleans:
+    """Whether each contact (C,) may be due to the model: it is small, or nothing should touch the arm in its log."""
+    identifies = context.study.log(contact.log).role == "identification"
+    return np.asarray(verdicts.is_small(contact) | (identifies & (contact.stated == 0)))
+
+
 def held_level(context: Context, contact: Contact, row: int) -> str:
     """The mean of the middle half of a push that is held, so that it is near the peak; else ""."""
     mean = f"contact.{contact.log}.{contact.joint}.{row + 1}.middle_mean"
-    is_held = contact.middle_mean[row] * np.sign(contact.peak[row]) > HELD * abs(contact.peak[row])
+    peak, middle = abs(contact.peak[row]), contact.middle_mean[row] * np.sign(contact.peak[row])
+    is_held = middle > min(HELD * peak, max(peak - contact.peak_std[row], MIN_HELD * peak))
     return f", held at {context.number(mean, 3)}" if is_held else ""
 
 
