@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import davinci_forces
 from davinci_forces import commands, exports, guide, robots, stages
 from davinci_forces.cli import app
-from davinci_forces.errors import BadRequest
+from davinci_forces.errors import BadRequest, BadStudy
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.logs import FORMATS
 from davinci_forces.maths.models.terms import TERMS
@@ -319,6 +319,26 @@ def test_the_study_file_of_the_guide_is_one(tmp_path):
 
 
 @pytest.mark.medium
+def test_the_page_on_study_files_has_every_key_of_one(tmp_path):
+    tables = "tool = { x = 1 }\nbase = { x = 1 }\nsettings = { x = 1 }\nrobot_overrides = { hand_roll = { x = 1 } }\n"
+    log = 'name = "a"\nfile = "a.csv"\nrole = "weight"\nx = 1\nweight = { x = 1 }\nchannels = { time = { x = 1 } }\n'
+    (tmp_path / "study.toml").write_text(f'robot = "davinci"\nx = 1\n{tables}[[log]]\n{log}')
+    with pytest.raises(BadStudy) as caught:
+        reading.read(tmp_path)
+    known = [keys.split(", ") for keys in re.findall("unknown key 'x'; known keys are (.*)", str(caught.value))]
+    assert len(known) == 8
+    written = re.findall(r"`(\w+)`|\b(\w+) = |(?m:^|`)\[+(?:log\.)?(\w+)", PAGES["study"])
+    assert not {key for keys in known for key in keys} - {word for words in written for word in words}
+
+
+def test_the_study_page_says_of_free_what_the_page_on_an_own_arm_says():
+    free = [re.search(r"\nfree = .*\n( +#.*\n)*", PAGES[page]) for page in ("study", "own-arm")]
+    assert free[0] is not None
+    assert "validation" in free[0][0]
+    assert free[1] is not None
+    assert free[0][0] == free[1][0]
+
+
 def test_the_scenario_of_the_guide_is_simulated_and_its_push_found(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slide.toml").write_text(PAGES["simulate"].partition("```toml\n")[2].partition("```")[0])

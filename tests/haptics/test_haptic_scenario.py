@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from importlib.resources import files
 
@@ -139,6 +140,9 @@ def test_the_command_says_what_each_hand_feels_and_where_its_limits_are(tmp_path
     assert "simulated, against tissue of 100 N/m" in text
     assert "Hand 'still' of m = 1 kg, b_H = 40 N s/m and K_H = 500 N/m" in text
     assert "limit for elastic tissue" in text
+    assert "for this tissue the hand's own damping suffices, by the response" in text
+    weak = written(tmp_path, SHORT.replace("damping = 40.0", "damping = 0.3"))
+    assert re.search(r"for this tissue a damping of 0\.\d+ N s/m is needed", said(weak))
 
 
 def test_its_numbers_and_traces_are_for_machines_too(tmp_path):

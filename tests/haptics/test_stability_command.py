@@ -46,9 +46,9 @@ def test_people_are_told_what_each_limit_means_and_where_the_thesis_s_tissue_is(
     text = said("--delay", "0.05")
     assert "Lyapunov" in text
     assert "worst" in text
-    assert "457.24 N/m, as in the thesis, needs a hand with a damping of 19.5 N s/m" in text
+    assert "For tissue of 457.24 N/m, as in the thesis, a damping of 19.5 N s/m is needed." in text
     assert "No setting is changed" in text
-    assert "needs a hand with a damping of 100 N s/m" in said("--b-h", "100", "--delay", "0.01")  # it has it
+    assert "as in the thesis, the hand's own damping suffices." in said("--b-h", "100", "--delay", "0.01")
     for words in (said(), said("--delay", "0")):
         assert "add --delay or --rate" in words
         assert "any" not in words.replace("every switching", "")

@@ -94,6 +94,8 @@ def _format_text(answer: Answer) -> str:
         lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"]
     for name, hand in answer["hands"].items():
         of_hand = f"m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m"
+        own, damping = hand["damping_needed"] <= hand["b_h"], f"{hand['damping_needed']:.3g} N s/m"
+        needed = "the hand's own damping suffices" if own else f"a damping of {damping} is needed"
         lines += ["", f"Hand {name!r} of {of_hand}:"]
         if hand["out_of_reach"] is not None:
             lines += [f"  unstable: the hand is thrown out of the device's reach after {hand['out_of_reach']:.1f} s"]
@@ -105,7 +107,7 @@ def _format_text(answer: Answer) -> str:
             f"{_quantity(hand['k_t_simulated'], 'N/m')} in simulation",
             f"  with the arm's friction and damping of tissue: {_quantity(hand['k_t_settles'], 'N/m')} in simulation",
             f"  {_quantity(hand['k_t_best'], 'N/m')} with the best additional delay, {hand['best_delay'] or 0:.3g} s; "
-            f"damping needed for this tissue: {hand['damping_needed']:.3g} N s/m; no setting is changed",
+            f"for this tissue {needed}, by the response; no setting is changed",
             f"  additional delay until unstable: {_quantity(hand['delay_margin'], 's')}",
         ]
     return "\n".join(lines)

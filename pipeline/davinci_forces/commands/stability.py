@@ -112,5 +112,5 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
     ]
     total = (delay or 0.0) + (0.5 / rate if rate else 0.0)
     damping = damping_needed(hand, THESIS_TISSUE, lambda damped: delay_limit(damped, total))
-    lines += [f"Tissue of {THESIS_TISSUE:g} N/m, as in the thesis, needs a hand with a damping of {damping:.3g} N s/m."]
-    return "\n".join(lines)
+    needed = f"a damping of {damping:.3g} N s/m is needed" if damping > hand.b else "the hand's own damping suffices"
+    return "\n".join([*lines, f"For tissue of {THESIS_TISSUE:g} N/m, as in the thesis, {needed}."])
