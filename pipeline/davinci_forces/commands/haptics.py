@@ -57,9 +57,7 @@ def _answer(scenario: "FullScenario", csv: Path | None) -> Answer:
     from davinci_forces.haptics import loop as haptic
 
     if not limits.has_limits(scenario):
-        why = f"the arm's controller does not stabilise its body of {scenario.body.inertia:g} kg, so it follows no hand"
-        remedy = "state other gains, [arm.control], another `tick` of the drivers, or another [arm.body]"
-        raise BadRequest(f"{scenario.title}: {why}; {remedy}")
+        raise BadRequest(f"{scenario.title}: the arm follows no hand, as {limits.why_unstable(scenario)}")
     loop = limits.loop_response(scenario)
     hands = {}
     for name, hand in scenario.hands:
@@ -94,11 +92,11 @@ def _format_text(answer: Answer) -> str:
         lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"]
     for name, hand in answer["hands"].items():
         of_hand = f"m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m"
-        own, damping = hand["damping_needed"] <= hand["b_h"], f"{hand['damping_needed']:.3g} N s/m"
-        needed = "the hand's own damping suffices" if own else f"a damping of {damping} is needed"
         lines += ["", f"Hand {name!r} of {of_hand}:"]
         if hand["out_of_reach"] is not None:
             lines += [f"  unstable: the hand is thrown out of the device's reach after {hand['out_of_reach']:.1f} s"]
+        own, damping = hand["damping_needed"] <= hand["b_h"], f"{hand['damping_needed']:.3g} N s/m"
+        needed = "the hand's own damping suffices" if own else f"a damping of {damping} is needed"
         lines += [
             f"  peak force: felt {hand['felt_peak']:.3g} N, true {hand['true_peak']:.3g} N; error of the felt force "
             f"{hand['felt_error']:.2g} N (rms)",

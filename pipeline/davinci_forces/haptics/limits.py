@@ -18,13 +18,14 @@ from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles, i
 from davinci_forces.haptics.maths import delay as delays
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import Complex
-from davinci_forces.haptics.scenario import Body, FullScenario
+from davinci_forces.haptics.scenario import MAX_TICKS, Body, FullScenario
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HandLimit
 
 NO_TISSUE = 1e-3  # [N/m] stiffness at which the hand feels the arm's motion alone
 SEGMENT_PERIODS, MIN_SEGMENTS = 8, 5  # periods of one segment of a log, and least number of segments with an error
 MAX_DELAY_MARGIN = 1.0  # [s]
+TICK_DIVISORS = (2, 4, 8)  # of the shorter ticks that are tried for an unstable arm
 TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
 # Time [s], the response of the filter at rest to the effort minus the model's, and its external effort, each (N,).
 Recording = tuple[Array, Array, Array]
@@ -47,6 +48,25 @@ def without_friction(scenario: FullScenario, body: Body | None = None) -> FullSc
 def has_limits(scenario: FullScenario) -> bool:
     """Whether the arm follows a slow hand, and not by the help of its friction alone, as with a loose controller."""
     return is_followed(scenario) and is_followed(without_friction(scenario))
+
+
+def why_unstable(scenario: FullScenario) -> str:
+    """Describe an arm without limits: its inertia and tick, and the longest shorter tick at which it has limits."""
+    divisors = [n for n in TICK_DIVISORS if n * scenario.duration / scenario.tick <= MAX_TICKS]
+    tick = next((scenario.tick / n for n in divisors if has_limits(replace(scenario, tick=scenario.tick / n))), None)
+    text = f"its simulated controller does not stabilise {scenario.body.inertia:.2g} kg at `tick` = {scenario.tick} s"
+    if tick:
+        return f"{text}; it does at {tick} s, so state tick = {tick} under [arm], or the tick and gains of your drivers"
+    tried = f", nor at a tick down to {scenario.tick / divisors[-1]} s" if divisors else ""
+    return f"{text}{tried}; check the gains of your drivers, [arm.control], and [arm.body]"
+
+
+def without_arm(name: str, hand: Hand) -> HandLimit:
+    """The limits of a hand that need no arm; all others are NaN."""
+    known: dict[str, Any] = {"hand": name, "hand_mass": hand.m, "hand_damping": hand.b, "hand_stiffness": hand.k}
+    known |= {"k_t_cqlf": cqlf_limit(hand), "k_t_switching": switching_limit(hand)}
+    unknown = dict.fromkeys(HandLimit.scalars(), math.nan) | dict.fromkeys(HandLimit.columns(), np.zeros(0))
+    return HandLimit(**unknown | known)
 
 
 def gain_and_impedance(scenario: FullScenario, frequency: float) -> tuple[complex, complex]:

@@ -52,7 +52,8 @@ def run(
         tuned.delay if tuned else haptics.filter_delay,
     )
     if not limits.has_limits(scenario):
-        yield not_followed(scenario, arm_from)
+        yield not_followed(scenario, FROM_FILE if haptics.body else arm_from)
+        yield from (limits.without_arm(name, hand) for name, hand in scenario.hands)
         return
     loop = limits.loop_response(scenario)
     recordings = list(filtered_recordings(comparisons, joint, tuned, q_tau)) if joint and tuned is not None else []
@@ -64,13 +65,10 @@ def run(
 
 def not_followed(scenario: FullScenario, arm_from: str) -> Diagnostic:
     """Warn that the simulated arm is unstable by itself, as with an inertia that the logs hardly determine."""
-    text = f"arm: its simulated controller does not stabilise {scenario.body.inertia:.2g} kg, the inertia of {arm_from}"
-    remedy = (
-        "state the gains [arm.control] and the drivers' period `tick` of your arm in the file that `haptics` names; if "
-        "the inertia is wrong, record a faster motion, or state [arm.body]"
-    )
-    message = f"{text}, so no limit of haptic feedback is computed; {remedy}"
-    return diagnostic("haptic-limits", "arm.followed", "warning", message)
+    why, where = limits.why_unstable(scenario), "in the file that study.toml names under `haptics`"
+    text = f"arm: no limit of haptic feedback through it is computed, as {why}, {where}"
+    remedy = f"if the inertia of {arm_from} is wrong, record a faster motion, or state [arm.body]"
+    return diagnostic("haptic-limits", "arm.followed", "warning", f"{text}; {remedy}")
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
