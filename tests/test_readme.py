@@ -52,7 +52,7 @@ from davinci_forces.runner import ALL
 from davinci_forces.runner.console import show_markdown
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration, stage_of
-from davinci_forces.study import AttachedMass, LogEntry, Options, Settings, reading
+from davinci_forces.study import AttachedMass, HapticScenario, LogEntry, Options, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES, TARE_ROLES
 from tests.conftest import ROOT
@@ -208,6 +208,7 @@ def test_old_names_are_gone_and_new_ones_there():
     names = {"stage": set(stages.STAGES), "record": set(KINDS)}
     names["column"] = {column for kind in KINDS.values() for column in (*kind.columns(), *kind.scalars())}
     names["folder in `processed/<study>/`"] = {kind.folder() for kind in KINDS.values()}
+    names["hand"] = {name for name, _ in HapticScenario().hands}
     renamed = rows("what", "before")
     assert renamed
     for what, old, new in renamed:
@@ -318,7 +319,6 @@ def test_the_study_file_of_the_guide_is_one(tmp_path):
     assert study.logs[0].joints == ("hand_roll",)
 
 
-@pytest.mark.medium
 def test_the_page_on_study_files_has_every_key_of_one(tmp_path):
     tables = "tool = { x = 1 }\nbase = { x = 1 }\nsettings = { x = 1 }\nrobot_overrides = { hand_roll = { x = 1 } }\n"
     log = 'name = "a"\nfile = "a.csv"\nrole = "weight"\nx = 1\nweight = { x = 1 }\nchannels = { time = { x = 1 } }\n'
@@ -339,6 +339,7 @@ def test_the_study_page_says_of_free_what_the_page_on_an_own_arm_says():
     assert free[0][0] == free[1][0]
 
 
+@pytest.mark.medium
 def test_the_scenario_of_the_guide_is_simulated_and_its_push_found(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slide.toml").write_text(PAGES["simulate"].partition("```toml\n")[2].partition("```")[0])

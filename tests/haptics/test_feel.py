@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 from davinci_forces.cli import app
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics import scenario as scenarios
-from davinci_forces.haptics.limits import has_limits, why_unstable
+from davinci_forces.haptics.limits import has_limits, loop_response, why_unstable
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
-from davinci_forces.haptics.maths.delay import sampled_limit
-from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
+from davinci_forces.haptics.maths.delay import response_limit, sampled_limit
+from davinci_forces.haptics.scenario import FIRM, SLIDE, SLIDE_NOISE
 from davinci_forces.records import FilterNoise, Fit, HandLimit, HapticResponse, HapticRun
 from davinci_forces.robots import davinci
 from davinci_forces.stages.tissue import haptic_limits
@@ -77,6 +77,21 @@ def test_no_tick_is_named_that_does_not_help_or_that_a_file_may_not_state():
     assert "nor at a tick down to 6.25e-05 s; check the gains of your drivers" in why_unstable(lightest)
     light = replace(lightest, body=SLIDE._replace(inertia=0.2), plan=((0.0, 0.0), (900.0, 0.01)))
     assert "at `tick` = 0.0005 s; check the gains" in why_unstable(light)
+
+
+def test_a_file_with_the_lines_that_the_report_shows_has_the_limits_of_the_report(tmp_path):
+    law = SCENARIO.law._replace(velocity_p=0.9 * SCENARIO.law.velocity_p)
+    scenario = HapticScenario(hands=(("firm", FIRM),), plan=PLAN, law=law, tick=2e-4)
+    precise = replace(noise(), r_q=1.4e-5, r_dq=1e-7, r_tau=0.2)
+    response, limit, _ = made([stiffness()], [fit((0.2, 0.05, 15.0, 1.7))], [precise], scenario)
+    file = tmp_path / "shown.toml"
+    file.write_text(response.scenario)
+    shown = haptic.complete_scenario(scenarios.read(file))
+    assert (shown.tick, float(shown.law.velocity_p[0]), shown.stiffness) == (2e-4, 0.0144, stiffness().stiffness)
+    of_template = replace(shown, noise=SLIDE_NOISE, q_tau=0.0)
+    again, other = (response_limit(FIRM, *loop_response(x))[0] for x in (shown, of_template))
+    assert_allclose(again, limit.k_t_response, rtol=1e-5)
+    assert other > 1.5 * again
 
 
 def test_an_arm_that_follows_by_the_help_of_its_friction_alone_is_refused(tmp_path):

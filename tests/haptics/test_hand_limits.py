@@ -14,10 +14,11 @@ from davinci_forces.haptics.maths.delay import delay_limit, formula, response_li
 from davinci_forces.haptics.scenario import FIRM, SLIDE, HapticScenario
 from davinci_forces.records import HandLimit, Origin
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.report.content import Prose, Table, Verdict, walk
+from davinci_forces.report.content import Figure, Prose, Table, Verdict, walk
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
 from davinci_forces.report.sections import stability
+from davinci_forces.report.sections.summary import opening
 from davinci_forces.robots import davinci
 from davinci_forces.study import Settings, Study
 from tests.haptics.test_limit import stiffness
@@ -153,8 +154,8 @@ def test_a_later_force_leaves_a_smaller_limit_and_a_weaker_one_a_larger_in_propo
         assert_allclose(getattr(limit, name), 2.0 * sampled_limit(THESIS_HAND, 0.0, 100.0), rtol=0.03)
 
 
-def section(**about):
-    """What the report says of a hand and of tissue of 457.24 N/m."""
+def context(**about) -> Context:
+    """A report on a hand and on tissue of 457.24 N/m."""
     values = dict.fromkeys(HandLimit.scalars(), 1.0) | dict.fromkeys(HandLimit.columns(), np.ones(5))
     values |= {"hand": "firm", "k_t_limit": 900.0, "k_t_limit_std": 50.0, "k_t_response": 918.0, "k_t_simulated": 891.0}
     records = [HandLimit(**(values | about)), stiffness()]
@@ -162,7 +163,11 @@ def section(**about):
         object.__setattr__(record, "origin", Origin("x", "0" * 64, {f.name: "" for f in fields(record)}))
     catalogue = Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])
     study = Study(None, "A study", davinci.ROBOT, True, Settings(), ())
-    return stability.section(Context(catalogue, study, collect(catalogue), Provenance("study", "1", {}, {}, {}, {})))
+    return Context(catalogue, study, collect(catalogue), Provenance("study", "1", {}, {}, {}, {}))
+
+
+def section(**about):
+    return stability.section(context(**about))
 
 
 @pytest.mark.parametrize(
@@ -174,7 +179,8 @@ def section(**about):
         ({"delay_margin": 0.0}, "warn", "may oscillate against the measured tissue"),
         ({"k_t_limit": 300.0}, "warn", "**not stable** against the measured tissue"),
         ({"filter_lag_std": NAN}, "info", "is not rated. To measure it, record more free motion"),
-        ({"k_t_limit": NAN}, "info", "no limit of the tissue's stiffness was found"),
+        ({"k_t_limit": NAN}, "info", "no limit of the tissue's stiffness was found."),
+        ({"k_t_limit": NAN, "loop_delay": NAN}, "info", "stiffness was found through this arm."),
     ],
 )
 def test_a_hand_is_said_to_be_stable_or_not_by_the_headline_and_its_interval(about, level, words):
@@ -195,3 +201,28 @@ def test_one_table_states_all_limits_and_no_page_says_that_any_tissue_is_stable(
     [prose] = [block for block in blocks if isinstance(block, Prose)]
     assert "agree within 3.0 %" in prose.text
     assert "every" not in prose.text
+
+
+@pytest.mark.parametrize(("std", "doubted"), [(10.0, False), (10.5, True), (NAN, False)])
+def test_page_one_says_of_a_limit_whose_95_percent_interval_holds_0_that_it_may_be_none(std, doubted):
+    [line] = opening.feedback(context(k_t_limit=20.0, k_t_limit_std=std))
+    assert line.startswith("Haptic feedback, simulated: stable on tissue up to 20")
+    assert line.endswith(" (cannot be told from none)") == doubted
+
+
+@pytest.mark.parametrize(("delay", "shown"), [(0.09, True), (0.49, False)])
+def test_a_delay_that_nobody_would_add_is_a_dash(delay, shown):
+    [table] = [block for block in walk(section(best_delay=delay)) if isinstance(block, Table)]
+    cells = {row[0]: row[1] for row in table.rows}
+    dashes = [cells[name] == "–" for name in ("Added delay with the highest limit", "Limit with that delay")]
+    assert dashes == [not shown, not shown]
+
+
+def test_of_an_arm_that_does_not_follow_the_limits_of_the_hands_alone_are_shown():
+    known = {name: value for name, value in vars(limits.without_arm("firm", FIRM)).items() if name != "hand"}
+    blocks = list(walk(section(**known)))
+    [table] = [block for block in blocks if isinstance(block, Table)]
+    names = ["Mass of the hand", "Damping of the hand", "Stiffness of the hand", "Lyapunov function", "Worst switching"]
+    assert [row[0] for row in table.rows] == names
+    [figure] = [block for block in blocks if isinstance(block, Figure) and block.label == "stability-limits"]
+    assert [panel.title for panel in figure.panels] == ["Without delay"]

@@ -40,10 +40,10 @@ def test_with_an_ideal_arm_and_ever_smaller_ticks_the_hand_moves_as_the_bimodal_
     assert 1.8 < errors[0] / errors[1] < 2.2  # a force that is held is half a tick late
 
 
-@pytest.mark.parametrize("name", ["thesis", "firm"])
+@pytest.mark.parametrize("name", ["relaxed", "firm"])
 def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
     hand = dict(FULL.hands)[name]
-    scenario = replace(FULL, plan=SLOW, device=FULL.device._replace(force=0.0 if name == "thesis" else 1.0))
+    scenario = replace(FULL, plan=SLOW, device=FULL.device._replace(force=0.0 if name == "relaxed" else 1.0))
     run = haptic.simulate_plan(scenario, hand)
     q, dq, tau, _ = run.readings.T
     nothing = np.zeros(len(q))
@@ -78,10 +78,10 @@ def test_a_sensor_in_place_of_the_filter_is_felt_at_the_next_message():
 
 def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():
     runs = {name: haptic.experiment(FULL, name, hand) for name, hand in FULL.hands}
-    assert runs["thesis"].out_of_reach
+    assert runs["relaxed"].out_of_reach
     assert not runs["firm"].out_of_reach
     assert len(runs["firm"].t) == 3000
-    assert np.abs(runs["thesis"].hand_x).max() <= FULL.reach
+    assert np.abs(runs["relaxed"].hand_x).max() <= FULL.reach
 
 
 def test_a_device_makes_no_more_force_than_it_can():

@@ -69,7 +69,7 @@ def test_the_shipped_file_says_what_is_taken_where_none_says_another(tmp_path):
         ("seed = 8", "sead = 8", (5, "unknown key 'sead'; known keys are")),
         ("mass = 1.0", "mass = 0", (19, "hand 1: mass must be finite and greater than 0, not 0")),
         ("damping = 40.0", "", (23, "hand 2: damping is missing")),
-        ('name = "firm"', 'name = "thesis"', (24, "two hands have the name 'thesis'")),
+        ('name = "firm"', 'name = "relaxed"', (24, "two hands have the name 'relaxed'")),
         ('name = "firm"', 'name = "My hand"', (24, "hand 2: name must match [a-z0-9_-]+")),
         ("motion_scale = 1.0", "motion_scale = -1", (30, "device: motion_scale must be finite and greater than 0")),
         (

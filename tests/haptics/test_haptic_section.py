@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.records import HapticResponse, HapticRun, Origin, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.report.content import Figure, OnScreen, Prose, Section, walk
+from davinci_forces.report.content import Figure, Listing, OnScreen, Prose, Section, walk
 from davinci_forces.report.content.marks import VSpan
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import collect
@@ -48,8 +48,10 @@ def test_contact_is_shaded_where_the_arm_presses():
 
 
 def test_figures_are_on_screen_only_and_all_say_that_they_are_simulated():
-    section = written(run(), read(HapticResponse("davinci", "the thesis", *[1.0] * 5, *[np.ones(3)] * 3)))
-    assert [type(block) for block in section.blocks] == [Prose, OnScreen]
+    lines = "[arm]\ntick = 1e-4"
+    section = written(run(), read(HapticResponse("davinci", "the thesis", lines, *[1.0] * 5, *[np.ones(3)] * 3)))
+    assert [type(block) for block in section.blocks] == [Prose, Listing, OnScreen]
+    assert section.blocks[1].text == lines
     assert "This is **simulated**, not recorded" in section.blocks[0].text
     folded = section.blocks[-1]
     shown = [block for block in walk(folded) if isinstance(block, Figure)]

@@ -6,7 +6,7 @@ The filter in the loop is the filter that tracks the logs; it takes one sample a
 import math
 from collections.abc import Callable
 from dataclasses import fields, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from davinci_forces.maths.simulation.actuators import Loops
 from davinci_forces.maths.simulation.step import Friction, at_rest
 from davinci_forces.maths.simulation.surroundings import Path
 from davinci_forces.records import HapticRun
+from davinci_forces.toml import in_toml
 
 NO_PATH = np.zeros((0, 2))  # no prescribed path: the hand moves freely
 PRESS_FORCE, EXTRA_SHARE = 10.0, 0.3  # [N] steady force of a hand, and share of it that is released at once
@@ -173,6 +174,23 @@ def filter_noise(scenario: FullScenario) -> NoiseModel:
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
     walk = model.q_tau or smallest_q_tau(tracker("ekf"), body.inertia, body.viscous, T_s, model, scenario.filter_delay)
     return model._replace(q_tau=walk)
+
+
+def in_file(scenario: FullScenario) -> str:
+    """The lines of a scenario file about tick, gains, and all that a study fills in, to 6 digits."""
+    body, law, walk = scenario.body, scenario.law, filter_noise(scenario).q_tau * scenario.rate**0.5
+    stated = body[:4] if body == Body(*body[:4], body.coulomb) else body  # the others have their defaults
+    late = "" if scenario.q_tau else f"  # q_tau shows a push of 1 s at most {scenario.filter_delay:g} s late"
+    tables: dict[str, dict[str, Any]] = {
+        "[arm.control]": law._asdict(), "[arm.body]": dict(zip(body._fields, stated, strict=False)),
+        "[arm.noise]": scenario.noise._asdict(), "[tissue]": {"stiffness": scenario.stiffness},
+        f"[filter]{late}": {"q_tau": walk},
+    }  # fmt: skip
+    lines = ["[arm]", f"tick = {scenario.tick}"]
+    for table, values in tables.items():
+        numbers = ((key, [float(f"{x:.6g}") for x in np.ravel(value).tolist()]) for key, value in values.items())
+        lines += [table, *(f"{key} = {in_toml(x if len(x) > 1 else x[0])}" for key, x in numbers)]
+    return "\n".join(lines)
 
 
 def experiment(scenario: FullScenario, name: str, hand: Hand) -> HapticRun:

@@ -72,7 +72,7 @@ class HapticScenario:
 
     title: str = "Section 8.4: in and out of tissue"
     seed: int = 8
-    hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS_HAND), ("firm", FIRM))
+    hands: tuple[tuple[str, Hand], ...] = (("relaxed", THESIS_HAND), ("firm", FIRM))
     device: Device = DEVICE
     reach: float = 0.15  # [m] reach of the device on either side of the tissue's surface
     link_rate: float = 100.0  # [Hz] rate of messages, chapter 9

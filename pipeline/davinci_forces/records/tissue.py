@@ -175,6 +175,7 @@ class HapticResponse(RobotRecord):
     PUBLISHED = ("haptics: tissue_stiffness at_frequency rendered_stiffness transparency felt_delay",)
 
     arm_from: str
+    scenario: str
     tissue_stiffness: float
     at_frequency: float
     rendered_stiffness: float

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HapticResponse, HapticRun
-from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose
+from davinci_forces.report.content import Block, Figure, Listing, OnScreen, Panel, Prose, literal
 from davinci_forces.report.content.marks import AnyMark, HLine, Line, VLine
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import MM, MS, explanation, hand_name, section_of, spans_where
+from davinci_forces.report.sections.parts import MM, MS, explanation, section_of, spans_where
 
 SAMPLES_DRAWN = 300  # samples of a run in its figure
 
@@ -17,6 +17,7 @@ def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The haptic loop.  Section 8.4"""
     responses = context.catalogue.records(HapticResponse)
     yield Prose(experiment(context, responses))
+    yield from (Listing(response.scenario) for response in responses)
     figures = (*(traces(context, run) for run in runs), *map(response_figure, responses))
     yield OnScreen("The force that each hand feels, over time and over frequency", "haptic-loop", figures)
 
@@ -36,8 +37,8 @@ def experiment(context: Context, responses: list[HapticResponse]) -> str:
     true, felt, frequency, late = context.numbers("haptics", names)
     return (
         f"{text}\n\nThe model of the slide is {arm}; the model's error on the real arm is not included. To a hand that "
-        f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}. Try your "
-        "own numbers: `davinci-forces haptics --help`."
+        f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}.\n\n"
+        f"{explanation('haptics-scenario')}"
     )
 
 
@@ -59,7 +60,7 @@ def traces(context: Context, run: HapticRun) -> Figure:
         Line(t, run.true_force[few], "true", "black", "solid"),
         Line(t, run.felt_force[few], "felt", "vermillion", "dashed"),
     )
-    hand, error = hand_name(context, run.hand), context.number(f"haptics.{run.hand}.felt_error", 2)
+    hand, error = literal(run.hand), context.number(f"haptics.{run.hand}.felt_error", 2)
     caption = explanation("haptic-run", hand=hand, error=error, ends=ends)
     alt = (
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "

@@ -62,11 +62,6 @@ def run_cells(run: Any) -> tuple[str, str]:
     return literal(run.log), title(run.joint)
 
 
-def hand_name(context: Context, hand: str) -> str:
-    """The name of a hand; the default hand is named after the thesis only in simulations of the thesis."""
-    return "default" if hand == "thesis" and not context.compares_with_thesis else literal(hand)
-
-
 def paper_or_screen(table: Table, name: str = "") -> Iterator[Block]:
     """A table on paper, or on screen if it has more rows than `PAPER`, under a name or the start of its caption."""
     name = name or re.split(r"[;:.?](?: |$)", table.caption)[0]

@@ -10,10 +10,11 @@ from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stif
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line
 from davinci_forces.report.context import Context, label
-from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, explanation, hand_name, section_of
+from davinci_forces.report.sections.parts import MS, THESIS_TISSUE, explanation, section_of
 
 COLOURS: tuple[Colour, ...] = ("blue", "vermillion", "purple", "orange")
 TISSUES: tuple[Colour, ...] = ("green", "sky", "yellow")
+MAX_ADDED_DELAY = 0.1  # [s] longest delay that anybody would add to make a hand stable
 SAME, NO_DELAY = "hand, link, arm, filter, sampling", "hand; no delay, link, arm or filter; any switching"
 ROWS = (
     *((f"hand_{name}", f"{name.capitalize()} of the hand", "assumed") for name in ("mass", "damping", "stiffness")),
@@ -44,18 +45,20 @@ def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     yield Prose(model(context, limits))
     yield limits_table(context, limits)
     alt = "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force."
-    panels = (map_panel(context, tissues), delay_panel(context, limits, tissues))
+    followed = bool(np.isfinite(limits[0].loop_delay))  # else only limits that need no arm are known
+    panels = (map_panel(context, tissues), *[delay_panel(context, limits, tissues)] * followed)
     yield Figure(explanation("stability-limits"), alt, panels, "stability-limits", columns=2, height=62)
     yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 
 def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Verdict:
     """Whether a hand is stable against the stiffest measured tissue: the headline and its interval."""
-    key, name = f"stability.{limit.hand}", hand_name(context, limit.hand)
+    key, name = f"stability.{limit.hand}", literal(limit.hand)
     stiffest = max(tissues, key=lambda tissue: tissue.stiffness)
     tissue = context.number(f"tissue.{stiffest.log}.stiffness")
     if limit.k_t_limit != limit.k_t_limit:
-        return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
+        through = " through this arm" * bool(np.isnan(limit.loop_delay))
+        return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found{through}.")
     headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
     half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
     if np.isnan(limit.filter_lag_std):
@@ -92,10 +95,18 @@ def model(context: Context, limits: list[HandLimit]) -> str:
 
 def limits_table(context: Context, limits: list[HandLimit]) -> Table:
     """The limits of all hands, with what each includes."""
-    keys = [f"stability.{limit.hand}" for limit in limits]
-    rows = tuple((name, *(context.number(f"{key}.{field}", 3) for key in keys), what) for field, name, what in ROWS)
-    header = ("Quantity", *(hand_name(context, limit.hand) for limit in limits), "Includes")
+    rows = tuple(
+        (name, *(dash(limit, field) or context.number(f"stability.{limit.hand}.{field}", 3) for limit in limits), what)
+        for field, name, what in ROWS
+        if np.isfinite(limits[0].loop_delay) or np.isfinite(getattr(limits[0], field))
+    )
+    header = ("Quantity", *(literal(limit.hand) for limit in limits), "Includes")
     return Table(explanation("stability-table"), header, rows, "stability-table", "l" + "r" * len(limits) + "l")
+
+
+def dash(limit: HandLimit, field: str) -> str:
+    """A dash in place of an additional delay so long that nobody would add it, and of its limit; else ""."""
+    return "–" * (field in ("best_delay", "k_t_best") and limit.best_delay > MAX_ADDED_DELAY)
 
 
 def map_panel(context: Context, tissues: list[Stiffness]) -> Panel:
@@ -126,7 +137,7 @@ def delay_panel(context: Context, limits: list[HandLimit], tissues: list[Stiffne
     """The limit of each hand over an additional delay."""
     marks: list[AnyMark] = []
     for limit, colour in zip(limits, cycle(COLOURS), strict=False):
-        known, name = limit.k_t_delay > 0.0, hand_name(context, limit.hand)
+        known, name = limit.k_t_delay > 0.0, literal(limit.hand)
         marks.append(Line(MS * limit.delay[known], limit.k_t_delay[known], name, colour, "solid"))
     marks += tissue_lines(context, tissues)
     return Panel("Whole loop", "added delay [ms]", "stiffness of tissue [N/m]", tuple(marks), y_log=True)

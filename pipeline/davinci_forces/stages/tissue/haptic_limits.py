@@ -130,8 +130,8 @@ def haptic_response(robot: Robot, arm_from: str, scenario: FullScenario, answer:
     share = float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.share))
     gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness
     return HapticResponse(
-        robot=robot.name, arm_from=arm_from, tissue_stiffness=stiffness, at_frequency=PALPATION_FREQUENCY,
-        rendered_stiffness=gain * share * stiffness, transparency=share,
+        robot=robot.name, arm_from=arm_from, scenario=haptic.in_file(scenario), tissue_stiffness=stiffness,
+        at_frequency=PALPATION_FREQUENCY, rendered_stiffness=gain * share * stiffness, transparency=share,
         felt_delay=float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.late)), frequency=answer.frequency,
         felt_share=answer.share, felt_late=answer.late,
     )  # fmt: skip

@@ -5,11 +5,12 @@ from hashlib import sha256
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Level, Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
-from davinci_forces.report.sections.parts import RATINGS, grade_of_mass, hand_name
+from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
 from davinci_forces.report.verdicts import DETECTABLE, WORDS, Trust, band, doubt_of_mass, percent, stiffness_level
 from davinci_forces.robots.robot import TIP_JOINTS
 from davinci_forces.study.review import STUDY
@@ -78,10 +79,11 @@ def measurements(context: Context) -> tuple[str, ...]:
 def feedback(context: Context) -> Iterator[str]:
     """The stiffest tissue that haptic feedback could render stably to each simulated hand."""
     limits = [limit for limit in context.catalogue.records(HandLimit) if np.isfinite(limit.k_t_limit)]
+    doubts = [" (cannot be told from none)" * (x.k_t_limit <= NORMAL_95 * x.k_t_limit_std) for x in limits]
     rendered = [
-        f"{context.number(f'stability.{limit.hand}.k_t_limit', 3)} with hand “{hand_name(context, limit.hand)}” "
-        f"({limit.hand_mass:.3g} kg, {limit.hand_damping:.3g} N s/m, {limit.hand_stiffness:.3g} N/m)"
-        for limit in limits
+        f"{context.number(f'stability.{limit.hand}.k_t_limit', 3)} with hand “{literal(limit.hand)}” "
+        f"({limit.hand_mass:.3g} kg, {limit.hand_damping:.3g} N s/m, {limit.hand_stiffness:.3g} N/m){doubt}"
+        for limit, doubt in zip(limits, doubts, strict=True)
     ]
     if rendered:
         yield f"Haptic feedback, simulated: stable on tissue up to {as_list(rendered)}"
