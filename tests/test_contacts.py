@@ -227,6 +227,15 @@ def test_the_last_half_second_of_a_log_is_no_touch_and_raises_no_level():
         assert (space.free_max > 2.0) == counts
 
 
+@pytest.mark.parametrize(("role", "end", "is_told"), [("validation", 39.0, True), ("validation", 12.0, False),
+                                                      ("contact", 39.0, False)])  # fmt: skip
+def test_a_log_of_validation_whose_offset_is_of_all_its_samples_tests_too_little(role, end, is_told):
+    about = entry(role=role, free=((0.0, end),))
+    made = assess.run(track(noise(), role=role, dq=np.ones(len(T))), about, arm.ARM)
+    said = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
+    assert any("`free` covers 98% of the log" in text for text in said) == is_told
+
+
 def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),)), arm.ARM))
     assert not list(assess.run(track(noise()), entry(role="contact"), arm.ARM))

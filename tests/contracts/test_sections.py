@@ -874,7 +874,8 @@ def test_contacts_of_a_log_whose_free_motion_is_unknown_are_doubted(lab: Lab, ca
         row = np.argmin(np.abs(contact.peak))
         return str(about.number(f"contact.{contact.log}.{contact.joint}.{row + 1}.peak", 3))
 
-    doubt = f"** {small} peaks below twice the alarm level may be due to the model: see [@contacts]."
+    why = "below twice the alarm level or in a log that identifies may be due to the model"
+    doubt = f"** {small} peaks {why}: see [@contacts]."
     for about, doubted in ((known, False), (unknown, True)):
         paragraph = summary.opening_paragraph(about, found)
         assert doubt in paragraph
@@ -1019,7 +1020,9 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     logs = (replace(full.study.logs[0], channels=(channel,)),)
     told = opening.currents_in_words(replace(full, study=replace(full.study, robot=robot, logs=logs)))
     assert (
-        told == " 1 A of a motor counts as 8.76 N m on the hand roll (by the robot’s description: check your drives)."
+        told
+        == " 1 A of a motor counts as 8.76 N m on the hand roll (by the robot’s description: check your drives); no ± "
+        "holds the error of that."
     )
     for count, where in ((2, "the hand roll 1 and the hand roll 2"), (4, "each of 4 joints")):
         alike = tuple(replace(drive, name=f"{joint.name}_{i}") for i in range(1, count + 1))
@@ -1031,7 +1034,7 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
             logs=(replace(logs[0], channels=channels),),
         )
         told = opening.currents_in_words(replace(full, study=study))
-        assert told == f" 1 A of a motor counts as 8.76 N m on {where}."
+        assert told == f" 1 A of a motor counts as 8.76 N m on {where}; no ± holds the error of that."
 
 
 def test_page_one_names_the_log_of_all_panels_and_peaks_once(full: Context):

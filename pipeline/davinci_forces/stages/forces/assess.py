@@ -8,7 +8,7 @@ from davinci_forces.filters.error_bands import joint_alarm_level
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space, is_outside
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -16,6 +16,7 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MAX_FITTED = 2.0  # largest effort of a fitted log over its typical alarm level, beyond which it is a touch
+MAX_SHARE_FREE = 0.5  # of a log of validation that may give its offset
 TOUCHED = 3.0  # largest effort of a log over its typical alarm level; recorded free motion stays below 1.7
 
 
@@ -29,6 +30,11 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     smoothed, filtered = (
         which(track.t, entry.possible_contact, track.rate, track.unscored) for which in (free_smoothed, free_space)
     )
+    share = 1.0 - float(np.mean(is_outside(track.t, entry.free)))
+    if entry.role == "validation" and share > MAX_SHARE_FREE:
+        name, why = f"{track.log}/{track.joint}", "so levels and coverage come from the samples that gave its offset"
+        message = f"{name}: `free` covers {share:.0%} of the log, {why}, and are too good; state only a part of it"
+        yield diagnostic("assess", f"{track.log}.{track.joint}.free", "warning", message)
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
     if int(smoothed.sum()) >= MIN_FREE_SAMPLES:

@@ -28,6 +28,7 @@ MAX_PEAKS = 6  # contacts of which page one states each peak
 # Of its peak: the mean of the middle half of a push that is held, and the least within the peak's error; a triangle's
 # is three quarters.
 HELD, MIN_HELD = 0.9, 0.85
+PLATEAU = 0.97  # of the largest effort of a contact, the last of which has the dot
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -241,7 +242,8 @@ def named_peaks(track: Track, contact: Contact) -> Points:
     places, rows = [], contact.found > 0
     for start, end in zip(contact.onset[rows], contact.release[rows], strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
-        places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
+        size = np.abs(track.tau_ext_smooth[inside])
+        places.append(inside[np.flatnonzero(size >= PLATEAU * size.max())[-1]])  # its value would cover a plateau
     t, peaks, width = track.t[places], contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     largest = [(np.abs(peaks[np.abs(t - at) < width]) <= abs(p)).all() for at, p in zip(t, peaks, strict=True)]
     names = tuple(in_format(p, "+.3g") if named else "" for named, p in zip(largest, peaks, strict=True))

@@ -153,7 +153,8 @@ def currents_in_words(context: Context) -> str:
     whose = " (by the robot’s description: check your drives)" if is_listed else ""
     tested = any(np.isfinite(weight.stated_mass) for weight in context.catalogue.records(Weight))
     untested = "" if tested else "; no known mass tests that, and all efforts scale with it"
-    return f" 1 A of a motor counts as {'; '.join(factors)}{whose}{untested}." if factors else ""
+    factors_in_words = f" 1 A of a motor counts as {'; '.join(factors)}{whose}; no ± holds the error of that{untested}."
+    return factors_in_words if factors else ""
 
 
 def nothing_identified(context: Context) -> Iterator[Verdict]:
