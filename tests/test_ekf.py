@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -506,3 +507,19 @@ def test_a_test_push_is_a_half_sine_of_one_second_and_its_delay_that_of_the_larg
     late = 0.8 * half_sine(t, 2.07) + 5.0 * (t > 4.2)  # what comes much later is no response
     assert response(3.0 * late, t, 2.0, 3.0) == pytest.approx((0.8, 0.07), abs=1e-9)
     assert response(-3.0 * late, t, 2.0, -3.0) == pytest.approx((0.8, 0.07), abs=1e-9)
+
+
+def test_noise_that_no_band_shows_is_that_between_periods_and_never_none():
+    """At 20 Hz nothing is above a low-pass of 17 Hz."""
+    t = np.arange(400) / 20.0
+    columns = {
+        "q_measured": 2.0 * np.sin(t),
+        "dq_measured": 2.0 * np.cos(t),
+        "tau": 3.0 * np.sin(t),
+        "tau_hat": 0.0 * t,
+    }
+    model = SimpleNamespace(**columns, rate=20.0, segment=np.zeros(400, np.int64), inertia=np.full(400, 0.5))
+    stated = SimpleNamespace(sigma_q=1e-3, sigma_dq=0.0, sigma_tau=0.2)
+    q, dq, _, q_dq, _ = tune.initial_noise(model, stated, 17.0)
+    assert (q, q_dq) == pytest.approx((1e-3, 0.2 / 20.0 / 0.5))
+    assert dq == pytest.approx(1e-9 * np.ptp(columns["dq_measured"]))  # else a covariance would be singular

@@ -581,6 +581,11 @@ def test_a_torque_constant_at_a_joint_that_slides_is_a_force_per_ampere_wherever
     joint = next(joint for joint in joints if joint.name == name)
     proposed = TorqueConstant("heavy", name, 0.4, 40.0, 48.0, 0.5)
     assert f"48.00 ± 0.50 {unit} with gear_ratio = {gear_ratio:g}; 40 is used" in weigh.proposal(proposed, joint)
+    for used, agrees in ((47.6, True), (47.0, False)):  # within 1 % of the proposal, whatever its error
+        near = replace(proposed, torque_constant_used=used, torque_constant_std=0.05)
+        assert ("which agrees" in weigh.proposal(near, joint)) == agrees
+        shown = weight_section.torque_constants(Context(Catalogue(lambda kind: []), None, {}, None), [near])
+        assert shown.rows[0][-1] == ("keep" if agrees else "check")
     task = Task("weigh", "heavy", Fingerprint({}, {}, {}, {}, {}, ""), joints={j.name: j.for_units for j in joints})
     with execution.record_writer(Folders(tmp_path, tmp_path, tmp_path), task) as writer:
         place = writer.write(proposed)

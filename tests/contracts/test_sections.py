@@ -568,6 +568,10 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     assert f"One model with {len(arm)} parameters {together}." in text
     assert f"({len(arm)} parameters" not in text
     assert [cutoff for cutoff in (8, 9, 10) if f"low-pass of {cutoff} Hz" in text] == [8, 9, 10]
+    two = {name: getattr(arm, name)[: 2 * len(chosen)] for name in arm.columns()}
+    pair = Catalogue(lambda k: [*fits, replace(arm, cutoff=(8.0, 9.0), **two)] if k is Fit else records.records(k))
+    together = "describes hand roll and hand pitch together"
+    assert f"One model with {2 * len(chosen)} parameters {together}." in paragraph(replace(about, catalogue=pair))
     alone = replace(chosen, structure="coupled", phi=arm.phi[: len(chosen)])  # through links, of one joint
     fits = [alone if fit is chosen else fit for fit in full.catalogue.records(Fit)]
     records = Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind))

@@ -1,9 +1,8 @@
 """Records of masses on the arm."""
 
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRecord
 
-SAME_MASS = 0.01  # share of a stated mass: torque constants are not known better
+SAME = 0.01  # share of a stated mass or torque constant, which are not known better
 
 
 class Load(LogJointRecord):
@@ -85,12 +84,6 @@ class TorqueConstant(LogJointRecord):
     torque_constant_used: float  # NaN where the effort is in A
     torque_constant: float
     torque_constant_std: float
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the constant in use lies in the 95 % interval, or within `SAME_MASS` of the proposal."""
-        away, used = abs(self.torque_constant - self.torque_constant_used), self.torque_constant_used
-        return bool(away <= max(NORMAL_95 * self.torque_constant_std, SAME_MASS * abs(used)))
 
 
 class FreeWeight(LogRecord):

@@ -14,7 +14,7 @@ from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
 from davinci_forces.records.forces import MIN_COVERAGE
-from davinci_forces.records.weight import SAME_MASS, TorqueConstant, Weight
+from davinci_forces.records.weight import SAME, TorqueConstant, Weight
 from davinci_forces.report.content import Level
 from davinci_forces.report.content.number import Number, in_format
 
@@ -177,9 +177,14 @@ def mass_level(weight: Weight, constants: Sequence[TorqueConstant]) -> tuple[Lev
         return "info", "unstated"
     if any(is_taken(constant) for constant in constants if constant.log == weight.log):
         return "info", "taken"
-    if abs(weight.mass - weight.stated_mass) > max(NORMAL_95 * weight.mass_std, SAME_MASS * weight.stated_mass):
+    if not is_same(weight.mass, weight.mass_std, weight.stated_mass):
         return "warn", "scale"
     return ("good", "right") if weight.mass_std <= PRECISE * weight.stated_mass else ("warn", "wide")
+
+
+def is_same(value: float, std: float, stated: float) -> bool:
+    """Whether a stated mass or constant lies in the 95 % interval of its estimate, or within `SAME` of it."""
+    return abs(value - stated) <= max(NORMAL_95 * std, SAME * abs(stated))
 
 
 def doubt_of_mass(weight: Weight) -> str:

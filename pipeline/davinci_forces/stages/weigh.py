@@ -14,7 +14,7 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records.prediction import JointModel
 from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_names
 from davinci_forces.records.recordings import Motion
-from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weight
+from davinci_forces.records.weight import SAME, FreeWeight, Load, TorqueConstant, Weight
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry, Weighing, Weighings
 
@@ -183,7 +183,8 @@ def proposal(record: TorqueConstant, joint: Joint) -> str:
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
     away = abs(value - used) / std
-    verdict = "which agrees" if record.agrees else "which differs: check mass, position, gear and motor"
+    agrees = away <= NORMAL_95 or abs(value - used) <= SAME * used
+    verdict = "which agrees" if agrees else "which differs: check mass, position, gear and motor"
     return f"{text}; {used:g} is used, {away:.1f} standard errors away, {verdict}; the proposal is not applied"
 
 

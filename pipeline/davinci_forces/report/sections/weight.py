@@ -10,7 +10,7 @@ from davinci_forces.report.content import Block, Figure, Number, OnScreen, Panel
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, label, name_in_sentence, title
 from davinci_forces.report.sections.parts import explanation, grade_of_mass, run_cells, section_of
-from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, doubt_of_mass, percent
+from davinci_forces.report.verdicts import PRECISE, TURN_AROUND, doubt_of_mass, is_same, percent
 
 
 @section_of("Attached masses", "weight")
@@ -48,7 +48,8 @@ def torque_constants(context: Context, constants: list[TorqueConstant]) -> Table
     for constant in constants:
         used = context.size(constant, "torque_constant_used", digits=4)
         proposed = context.number(f"weight.{constant.log}.{constant.joint}.torque_constant", 3)
-        follows = "–" if math.isnan(constant.torque_constant_used) else "keep" if constant.agrees else "check"
+        agrees = is_same(constant.torque_constant, constant.torque_constant_std, constant.torque_constant_used)
+        follows = "–" if math.isnan(constant.torque_constant_used) else "keep" if agrees else "check"
         rows.append((*run_cells(constant), str(Number(constant.stated_mass, "kg")), used, proposed, follows))
     header = ("Log", "Joint", "Known mass", "Used", "Proposed", "In use")
     return Table(explanation("torque-constants"), header, rows, "torque-constants", "llrrrl")
