@@ -448,9 +448,11 @@ def test_a_name_of_the_reference_is_explained_by_the_tables_that_have_it(name, t
     assert says in first.replace("`", "")
 
 
-def test_a_topic_that_is_a_notebook_names_its_file():
-    with pytest.raises(BadRequest, match=r"from-arrays is a notebook; open .*from-arrays\.ipynb in Jupyter"):
-        guide.page("from-arrays")
+def test_a_topic_that_is_a_notebook_shows_its_words_and_code_and_names_its_file():
+    shown = guide.page("from-arrays").as_text
+    assert shown.startswith("# From arrays to external efforts")
+    assert "```python\nimport numpy as np" in shown
+    assert re.search(r"This is the notebook .*from-arrays\.ipynb; Jupyter shows its pictures, too\.$", shown)
 
 
 def test_a_term_of_two_words_needs_no_quotes():

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -77,7 +78,7 @@ def page(topic: str) -> Page:
         lines = (f"**`{topic}`** (topic `{where}`): {row.replace(' |', ';').strip()}" for where, row in rows)
         return replace(by_topic[rows[0][0]], write=lambda: "\n\n".join(lines))
     if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file() and topic not in by_topic:
-        raise BadRequest(f"{topic} is a notebook; open {notebook} in Jupyter")
+        return Page(topic, "", topic, "", lambda: _cells(notebook))
     if topic not in by_topic:
         titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
         times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
@@ -86,6 +87,14 @@ def page(topic: str) -> Page:
         meant = f"did you mean {' or '.join(close)}? " if close else ""
         raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
     return by_topic[topic]
+
+
+def _cells(notebook: Path) -> str:
+    """The words and the code of a notebook as Markdown, and where it is, as only Jupyter shows its pictures."""
+    cells = json.loads(notebook.read_bytes())["cells"]
+    texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+    shown = [text if kind == "markdown" else f"```python\n{text}\n```" for kind, text in texts]
+    return "\n\n".join([*shown, f"This is the notebook {notebook}; Jupyter shows its pictures, too."])
 
 
 def by_group() -> list[tuple[str, list[Page]]]:
