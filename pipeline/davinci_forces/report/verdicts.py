@@ -277,5 +277,11 @@ def percent(share: float) -> str:
 
 def thresholds() -> list[tuple[str, ...]]:
     """The rows of the table of thresholds: quantity, measure, and the bounds of good, caution and problem."""
-    text = text_of(read_bytes(Path(__file__).with_name("thresholds.csv"))).format(**globals()).replace("%", " %")
+    shares = {
+        "detected": DETECTED, "detectable": DETECTABLE, "good": GOOD, "caution": CAUTION, "new_path": MIN_NEW_PATH,
+        "least": COVERED[0], "most": COVERED[1], "precise": PRECISE, "rough": ROUGH, "counted": MIN_COUNTED,
+        "same": SAME, "unlikely": UNLIKELY,
+    }  # fmt: skip
+    limits = {name: percent(share) for name, share in shares.items()} | {"singular": f"{NEAR_SINGULAR:g}"}
+    text = text_of(read_bytes(Path(__file__).with_name("thresholds.csv"))).format(**limits)
     return list(map(tuple, csv.reader(text.splitlines())))

@@ -34,7 +34,7 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     if entry.role == "validation" and share > MAX_SHARE_FREE:
         name, why = f"{track.log}/{track.joint}", "so levels and coverage come from the samples that gave its offset"
         message = f"{name}: `free` covers {share:.0%} of the log, {why}, and are too good; state only a part of it"
-        yield diagnostic("assess", f"{track.log}.{track.joint}.free", "warning", message)
+        yield diagnostic("assess", f"{track.log}.{track.joint}.free", "note", message)
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
     if int(smoothed.sum()) >= MIN_FREE_SAMPLES:
