@@ -17,7 +17,8 @@ def section(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The haptic loop.  Section 8.4"""
     responses = context.catalogue.records(HapticResponse)
     yield Prose(experiment(context, responses))
-    yield from (Listing(response.scenario) for response in responses)
+    for response in responses:
+        yield OnScreen("The scenario of these limits", "haptic-scenario", (Listing(response.scenario),))
     figures = (*(traces(context, run) for run in runs), *map(response_figure, responses))
     yield OnScreen("The force that each hand feels, over time and over frequency", "haptic-loop", figures)
 
