@@ -61,8 +61,8 @@ def _checked(export: Export, joint: ExportedJoint) -> Iterator[list[float]]:
         own, [tuned] = columns[2, :, names.index(joint.name)], catalogue.select(FilterNoise, joint=joint.name)
         y_q, y_dq = (delay_segments(x, m.segment, late)[part] for x in (m.q_measured, m.dq_measured))
         tau, dynamics = m.tau[part], model.joint_dynamics(fit.theta, motion)[row]
-        given = FilterInput(dynamics, y_q, y_dq, own, tau, T_s, online["initial_std"])
-        tracked = tracker(DEFAULT)(given, noise_model(tuned, joint.joint, T_s, export.study.settings.q_tau))
+        inputs = FilterInput(dynamics, y_q, y_dq, own, tau, T_s, online["initial_std"])
+        tracked = tracker(DEFAULT)(inputs, noise_model(tuned, joint.joint, T_s, export.study.settings.q_tau))
         results = efforts(model, fit.theta, motion)[:, row], tracked.tau_ext, tracked.tau_ext_std
         yield from np.column_stack([m.t[part], tau, y_q, y_dq, *columns, *results]).tolist()
 

@@ -1,16 +1,18 @@
 """The variance of a log's smoothed external effort, and the alarm level of a joint, from free motion of its logs."""
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.detection import alarm_level
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, FreeErrors, calibrate
-from davinci_forces.records import ErrorBand, FreeSpace
+from davinci_forces.records import ErrorBand, FreeSpace, Streamed
 from davinci_forces.records.prediction import ANOTHER_PATH
 
 OTHER_BLOCKS = "its own other blocks"  # the source if there is no other log
+Free = TypeVar("Free", bound=FreeSpace | Streamed)  # the free motion of a joint in a log, whole or as samples arrive
 
 
 def total_variance(
@@ -48,7 +50,7 @@ def free_errors(band: ErrorBand, is_centred: bool) -> FreeErrors:
     return FreeErrors(source, band.block, band.dq, error, band.tau_ext_std_filter, band.uncorrelated)
 
 
-def joint_alarm_level(spaces: Sequence[FreeSpace]) -> tuple[float, FreeSpace]:
+def joint_alarm_level(spaces: Sequence[Free]) -> tuple[float, Free]:
     """The alarm level of a joint over the free motion of its logs, and the log that gives it.
 
     A fitted log shows less of the model's error than others, so beside others it counts by its largest effort alone.

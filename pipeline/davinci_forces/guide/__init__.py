@@ -67,26 +67,26 @@ def page(topic: str) -> Page:
     Raises BadRequest if there is none; it names the topics that hold these words, or are spelled most alike.
     """
     by_topic = {page.topic: page for page in pages()}
+    if topic in by_topic:
+        return by_topic[topic]
     words = rf"(?<!\w){re.escape(topic)}s?(?!\w)"
     rows = re.findall(rf"(?mi)^\| ([^|]*{words}[^|]*) \|(.*)\|$", by_topic[TERMS].text)
     rows = rows or re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text)
-    if topic not in by_topic and rows:
+    if rows:
         return replace(by_topic[TERMS], write=lambda: "\n\n".join(f"**{term}**:{means}" for term, means in rows))
     named = re.compile(rf"(?m)^\| `{re.escape(topic)}` \|(.*)\|$")
     rows = [(page.topic, row) for page in by_topic.values() for row in named.findall(page.text)]
-    if topic not in by_topic and rows:
+    if rows:
         lines = (f"**`{topic}`** (topic `{where}`): {row.replace(' |', ';').strip()}" for where, row in rows)
         return replace(by_topic[rows[0][0]], write=lambda: "\n\n".join(lines))
-    if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file() and topic not in by_topic:
+    if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file():
         return Page(topic, "", topic, "", lambda: _cells(notebook))
-    if topic not in by_topic:
-        titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
-        times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
-        holding = sorted(filter(times.get, times), key=times.__getitem__, reverse=True)
-        close = titled[:3] or holding[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
-        meant = f"did you mean {' or '.join(close)}? " if close else ""
-        raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
-    return by_topic[topic]
+    titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
+    times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
+    holding = sorted(filter(times.get, times), key=times.__getitem__, reverse=True)
+    close = titled[:3] or holding[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
+    meant = f"did you mean {' or '.join(close)}? " if close else ""
+    raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
 
 
 def _cells(notebook: Path) -> str:

@@ -5,12 +5,13 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, diverges, filter_blocks
+from davinci_forces.filters.error_bands import joint_alarm_level
 from davinci_forces.filters.online import Window, delay_of
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.contact.detection import alarm_level, free_motion_statistics
+from davinci_forces.maths.contact.detection import free_motion_statistics
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_space
@@ -115,8 +116,7 @@ def streamed_peak(t: Array, tau_ext: Array, contact: Contact, row: int, late: fl
 def gather(streams: Iterable[Streamed]) -> Iterator[StreamLevel]:
     """Compute the alarm level of each joint's stream, and count the contacts whose peak exceeds it."""
     for joint, logs in by_name(streams, "joint").items():
-        levels = [alarm_level(s.free_rms, s.free_max, s.crossings) for s in logs]
-        level, source = max(zip(levels, logs, strict=True), key=lambda pair: pair[0])
+        level, source = joint_alarm_level(logs)
         yield StreamLevel(
             joint=joint, alarm_level=level, alarm_level_std=level * source.free_rms_std / source.free_rms,
             tested=len(logs), stream_delay=max(s.stream_delay for s in logs), contacts=sum(len(s) for s in logs),

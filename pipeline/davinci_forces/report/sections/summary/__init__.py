@@ -154,9 +154,9 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     Doubtful ones are not named beside others.  Then name the joints of contact logs
     without any, and the level below which a contact is missed.
     """
-    every = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
-    touched = {contact.joint for contact, _ in every}
-    above = [(contact, row) for contact, row in every if not is_doubtful(context, contact)[row]] or every
+    found = [(contact, row) for contact in contacts for row in np.flatnonzero(contact.above).tolist()]
+    touched = {contact.joint for contact, _ in found}
+    above = [(contact, row) for contact, row in found if not is_doubtful(context, contact)[row]] or found
     is_short = len(above) <= MAX_PEAKS
     if not is_short:
         by_size = sorted(above, key=lambda of: abs(of[0].peak[of[1]]))

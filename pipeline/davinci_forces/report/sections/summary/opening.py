@@ -91,9 +91,9 @@ def feedback(context: Context) -> Iterator[str]:
 
 def forces_at_tip(context: Context) -> Iterator[str]:
     """The largest force at the tip in the contacts of each log, with its standard error."""
-    every = context.catalogue.records(TipContact)
-    sought = [contact for contact in every if context.study.log(contact.log).role != "identification"]
-    for contact in sought or every:
+    contacts = context.catalogue.records(TipContact)
+    sought = [contact for contact in contacts if context.study.log(contact.log).role != "identification"]
+    for contact in sought or contacts:
         row = int(np.argmax(contact.f_peak))
         largest = context.number(f"tip.{contact.log}.{row + 1}.peak", 3)
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
