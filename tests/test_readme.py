@@ -466,6 +466,16 @@ def test_a_page_links_every_notebook():
         assert any(f"{notebook.name})" in text for text in texts), notebook.name
 
 
+def test_every_link_of_the_guide_s_file_leads_somewhere_in_it():
+    file = guide.as_html()
+    targets = set(re.findall(r'\bid="([^"]+)"', file))
+    assert {page.topic for page in guide.pages()} < targets
+    links = re.findall(r'<a [^>]*\bhref="([^"]+)"', file.partition("<script")[0])
+    inside = [link for link in links if not link.startswith("https://")]
+    assert len(inside) > 100
+    assert [link for link in inside if link.removeprefix("#") not in targets] == []
+
+
 def test_pages_that_are_made_have_every_field_name_and_robot_once():
     pages = {page.topic: page.text for page in guide.pages()}
     headings = re.findall(r"^## (.*)$", pages["fields"], re.M)

@@ -14,8 +14,10 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.guide import generated
 
 FOLDER = Path(__file__).parent
+NOTEBOOKS = "notebooks"  # their pages are made from the notebooks beside this module
 GROUPS = {  # folder -> its heading, in the order of the list
     "tutorials": "Tutorials: learn by doing",
+    NOTEBOOKS: "Notebooks: from Python",
     "how-to": "How to: one task each",
     "reference": "Reference: every name, from the code",
     "explanation": "Explanation: how and why",
@@ -23,7 +25,7 @@ GROUPS = {  # folder -> its heading, in the order of the list
     "changes": "Changes, by version",
 }
 INDEX, TERMS = "index", "terms"  # topics of the page that lists the others, and of that which explains terms
-LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.md(?:#([\w-]+))?\)")  # to a page, perhaps to a heading
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.(?:md|ipynb)(?:#([\w-]+))?\)")  # a page
 COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 PICTURE = re.compile(r"[\w./-]+\.png")
 
@@ -45,14 +47,17 @@ class Page:
 
     @property
     def as_text(self) -> str:
-        """The Markdown for a terminal: links to pages become their topics."""
-        return LINK.sub(lambda link: f"{link[1]} (topic `{link[2]}`)", self.text)
+        """The Markdown for a terminal: links to pages become their topics, and a notebook says where its file is."""
+        file = FOLDER / f"{self.topic}.ipynb"
+        pictures = f"\n\nThis is the notebook {file}; Jupyter shows its pictures, too." * (self.folder == NOTEBOOKS)
+        return LINK.sub(lambda link: f"{link[1]} (topic `{link[2]}`)", self.text) + pictures
 
 
 @cache
 def pages() -> tuple[Page, ...]:
     """All pages, by group; in a group in the order in which the index links them."""
     found = [_read(file) for file in FOLDER.rglob("*.md")]
+    found += [_notebook(file) for file in FOLDER.glob("*.ipynb")]
     found += [_made(topic, *about) for topic, about in generated.PAGES.items()]
     index = next(page for page in found if page.topic == INDEX)
     order = [INDEX, *(link[2] for link in LINK.finditer(index.text))]
@@ -79,22 +84,12 @@ def page(topic: str) -> Page:
     if rows:
         lines = (f"**`{topic}`** (topic `{where}`): {row.replace(' |', ';').strip()}" for where, row in rows)
         return replace(by_topic[rows[0][0]], write=lambda: "\n\n".join(lines))
-    if (notebook := Path(__file__).with_name(f"{topic}.ipynb")).is_file():
-        return Page(topic, "", topic, "", lambda: _cells(notebook))
     titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
     times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
     holding = sorted(filter(times.get, times), key=times.__getitem__, reverse=True)
     close = titled[:3] or holding[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
     meant = f"did you mean {' or '.join(close)}? " if close else ""
     raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
-
-
-def _cells(notebook: Path) -> str:
-    """The words and the code of a notebook as Markdown, and where it is, as only Jupyter shows its pictures."""
-    cells = json.loads(notebook.read_bytes())["cells"]
-    texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
-    shown = [text if kind == "markdown" else f"```python\n{text}\n```" for kind, text in texts]
-    return "\n\n".join([*shown, f"This is the notebook {notebook}; Jupyter shows its pictures, too."])
 
 
 def by_group() -> list[tuple[str, list[Page]]]:
@@ -167,6 +162,15 @@ def _read(file: Path) -> Page:
     title, summary = (" ".join(part.split()) for part in text.split("\n\n", 2)[:2])
     folder = file.parent.relative_to(FOLDER).as_posix().removeprefix(".")
     return Page(file.stem, folder, title.removeprefix("# "), summary, lambda: text)
+
+
+def _notebook(file: Path) -> Page:
+    """The words and the code of a notebook."""
+    cells = json.loads(file.read_bytes())["cells"]
+    texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+    shown = [text if kind == "markdown" else f"```python\n{text}\n```" for kind, text in texts]
+    title, summary = shown[0].split("\n\n", 2)[:2]
+    return Page(file.stem, NOTEBOOKS, title.removeprefix("# "), summary, lambda: "\n\n".join(shown))
 
 
 def _made(topic: str, title: str, summary: str, body: Callable[[], str]) -> Page:
