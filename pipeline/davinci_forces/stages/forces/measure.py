@@ -92,7 +92,7 @@ def contacts(
 
     A contact is not found, nor above the detection level, if the 95 % interval of its peak holds zero, as where the
     arm swings after a larger push.  What the smoother rounds off does not count in that interval: it makes a peak
-    smaller, never larger.  A peak is at least the mean.
+    smaller, never larger.  A peak is at least the mean, and that of the middle half.
     """
     windows = [window for window, _, _ in placed]
     free = free_smoothed(track.t, windows, track.rate, track.unscored)
@@ -117,8 +117,8 @@ def contacts(
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
             middle = middle_effort(track, (onset, release), free, friction_std) or summary[2:4]
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
-            # A short peak is flattened below the mean; its error stays.
-            peak = max(summary.peak, summary.mean, key=lambda x: x * np.sign(summary.peak))
+            # A short peak is flattened below the means; its error stays.
+            peak = max(summary.peak, summary.mean, middle[0], key=lambda x: x * np.sign(summary.peak))
             above = clear and bool(is_above[~is_outside(track.t, [window])].any())
             measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *middle, *impulse)
             rows.append((stated, event is not None, above, *measured))

@@ -167,7 +167,7 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     peaks = [
         f"{context.number(f'contact.{of.log}.{of.joint}.{row + 1}.peak', 3)} on {name_in_sentence(of.joint)} "
         f"({'' if named else f'{literal(of.log)}, '}{of.onset[row]:.1f} to {of.release[row]:.1f} s"
-        f"{held_level(context, of, row)})"
+        f"{level_or_impulse(context, of, row)})"
         for of, row in above
     ]
     text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
@@ -186,12 +186,15 @@ def is_doubtful(context: Context, contact: Contact) -> Booleans:
     return np.asarray(verdicts.is_small(contact) | (identifies & (contact.stated == 0)))
 
 
-def held_level(context: Context, contact: Contact, row: int) -> str:
-    """The mean of the middle half of a push that is held, so that it is near the peak; else ""."""
-    mean = f"contact.{contact.log}.{contact.joint}.{row + 1}.middle_mean"
+def level_or_impulse(context: Context, contact: Contact, row: int) -> str:
+    """The impulse of a push whose middle half is shorter than the smoother's rise; the level of one that is held."""
+    key = f"contact.{contact.log}.{contact.joint}.{row + 1}"
+    [track] = context.catalogue.select(Track, log=contact.log, joint=contact.joint)
+    if contact.duration[row] < 2.0 * track.smooth_rise:
+        return f", impulse {context.number(f'{key}.impulse', 3)}"
     peak, middle = abs(contact.peak[row]), contact.middle_mean[row] * np.sign(contact.peak[row])
     is_held = middle > min(HELD * peak, max(peak - contact.peak_std[row], MIN_HELD * peak))
-    return f", held at {context.number(mean, 3)}" if is_held else ""
+    return f", held at {context.number(f'{key}.middle_mean', 3)}" if is_held else ""
 
 
 def efforts_in_words(context: Context) -> str:
