@@ -163,3 +163,10 @@ def test_the_urdf_that_is_printed_is_shown_as_the_same_arm(tmp_path):
     for key in ("tip", "mass", "coriolis", "gravity"):
         np.testing.assert_allclose(found[key], expected[key], rtol=0, atol=1e-12)
     assert found["joints"]["hand_roll"]["limits"]["q"] == expected["joints"]["hand_roll"]["limits"]["q"]
+
+
+def test_the_direction_of_a_joint_is_that_in_the_middle_of_its_range_or_at_the_pose():
+    """A slide that is drawn in has the tip of the dVRK's arm on the other side of the remote centre."""
+    for words, direction in ((), "(1, 0, 0) in mid-range"), (("--at", "0,0,0.001"), "(-1, 0, 0)"):
+        [roll] = [line for line in asked("dvrk_psm", *words).output.splitlines() if line.startswith("       hand_roll")]
+        assert roll.endswith(f"; positive: the tip moves along {direction}")

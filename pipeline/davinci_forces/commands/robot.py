@@ -151,7 +151,7 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     """The document as text, in base axes and SI units, rounding errors as 0."""
     from davinci_forces.maths.mechanics.tip_force import ARM
 
-    lines = [robot.title, "", *_joint_lines(robot, document.get("jacobian_v", []))]
+    lines = [robot.title, "", *_joint_lines(robot, q)]
     if "frames" not in document:
         return "\n".join([*lines, "", "its geometry is not known; add [[link]] to its file, or use a URDF"])
     lines += ["", f"at q = {_numbers(q)}"]
@@ -173,8 +173,12 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
 
 
-def _joint_lines(robot: "Robot", J_v: list[list[float]]) -> Iterator[str]:
-    """One line per joint: its range, speed, the terms of its effort, and where a positive motion moves the tip."""
+def _joint_lines(robot: "Robot", q: list[float]) -> Iterator[str]:
+    """One line per joint: its range, speed, the terms of its effort, and where a positive motion moves the tip.
+
+    At the pose of zeros that is with all joints in mid-range: a slide that is drawn in may reverse it.
+    """
+    J_v, where_from = _directions(robot, q)
     width = max(len(joint.name) for joint in robot.joints)
     for i, joint in enumerate(robot.joints):
         terms = " + ".join(term.name for term in joint.terms)
@@ -185,8 +189,21 @@ def _joint_lines(robot: "Robot", J_v: list[list[float]]) -> Iterator[str]:
         up = robot.chain.up if robot.chain else (0.0, 0.0, 0.0)
         rises = sum(map(float.__mul__, column, up)) / (size or 1.0)
         side = ", down" if rises < -0.9 else ", up" if rises > 0.9 else ""
-        where = f"; positive: the tip moves along ({towards}){side}" if towards else ""
+        where = f"; positive: the tip moves along ({towards}){side}{where_from}" if towards else ""
         yield f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}{where}"
+
+
+def _directions(robot: "Robot", q: list[float]) -> tuple[list[list[float]], str]:
+    """The Jacobian of the tip at a pose, or with all joints in mid-range if the pose is all zeros; and which it is."""
+    from davinci_forces.maths.mechanics import kinematics
+
+    if robot.chain is None:
+        return [], ""
+    ranges = [joint.limits.q for joint in robot.joints]
+    middle = [0.5 * (low + high) if math.isfinite(high - low) else 0.0 for low, high in ranges]
+    pose = q if any(q) else [*middle, *q[len(middle) :]]
+    J_v, _ = kinematics.jacobian(robot.chain, pose)
+    return J_v.tolist(), "" if any(q) else " in mid-range"
 
 
 def _moves(joint: "Joint") -> str:
