@@ -1,5 +1,6 @@
 """Where a motion repeats, how far, and which of its periods to trust: stops, transients, steps of the clock."""
 
+import re
 import tracemalloc
 from dataclasses import replace
 
@@ -247,6 +248,18 @@ def test_what_does_not_fill_a_period_is_left_out_at_the_start_before_a_period_is
     assert made.periods == 5
     assert made.t_start == pytest.approx(6.0, abs=0.011)
     assert "write skip = 6" in text
+
+
+def test_a_rest_and_a_slow_start_are_not_said_to_be_longer_than_they_are():
+    """Rest of 2 s and a run-in of 3 s, then 5.7 periods: the whole ones are at the end."""
+    t = np.arange(6200) / RATE
+    signal, eased = moved(t), np.clip((t - 2.0) / 3.0, 0.0, 1.0)
+    made, texts = run(replace(signal, q=eased * signal.q, dq=eased * signal.dq, tau=eased * signal.tau))
+    assert [of.periods for of in made] == [5]
+    [text] = texts
+    start = float(re.findall(r"the (\d\.\d\d) s before do not repeat", text)[0])
+    assert 3.0 < start < 5.05
+    assert "period 1 of 5" not in text or f"period 1 of 5 from {start:.2f} s on differs" in text
 
 
 def test_an_odd_period_among_others_is_named_and_kept():

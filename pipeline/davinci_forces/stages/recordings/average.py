@@ -153,8 +153,9 @@ def omissions(
     Less than two periods at either end, as of a rest, a run-in or a stop, are expected, so they are a note.
     """
     t, gaps = first.t, gaps_at(first, periodic)
-    sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (periodic.start > 0)
-    sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
+    sides = [f"the {t[periodic.start] - t[0]:.2f} s before"] * (periodic.start > 0)
+    sides += [f"the {t[-1] - t[periodic.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
+    counted = f" from {t[periodic.start]:.2f} s on" * bool(sides)
     faults = []
     if sides:
         what = f"as in a stop, a ramp or another motion{gaps}"
@@ -165,7 +166,7 @@ def omissions(
         if inside or long or not sides:  # beside a standstill, a short transient is expected
             fewer = d.periods < differing[0][1].periods
             number = f"the remaining {d.periods}" if fewer else f"{d.periods}"
-            differs = f"period {d.period + 1} of {number} differs from the others by {d.rms:.3g} rms in {name}"
+            differs = f"period {d.period + 1} of {number}{counted} differs from the others by {d.rms:.3g} rms in {name}"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
             faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
