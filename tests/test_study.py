@@ -121,6 +121,8 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ),
         ("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 0\n[[log]]",
             "4: robot_overrides.hand_roll: gear_ratio must be a number other than 0, not 0"),
+        ("[[log]]", "[robot_overrides.hand_roll]\nlimits = [0, 1]\n[[log]]",
+            "4: robot_overrides.hand_roll.limits: must be a table such as { q = [-0.6, 0.6], dq = [-1.2, 1.2] }, not"),
         ("[[log]]", '[robot_overrides.hand_roll]\ntitle = "Rig"\n[[log]]',
             "4: robot_overrides.hand_roll: title is not shown: reports name a joint by its name"),
         ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]",

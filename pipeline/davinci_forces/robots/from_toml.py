@@ -115,7 +115,7 @@ def _not_zero(table: TomlTable, key: str, default: float) -> float:
 
 
 def _limits(table: TomlTable) -> Limits:
-    limits = table.table("limits")
+    limits = table.table("limits", like="{ q = [-0.6, 0.6], dq = [-1.2, 1.2] }")
 
     def are_bounds(pair: list[Any]) -> bool:
         return len(pair) == 2 and all(is_number(x) or x in ANYWHERE for x in pair) and pair[0] < pair[1]

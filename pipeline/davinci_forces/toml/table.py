@@ -102,12 +102,12 @@ class TomlTable:
     A missing or wrong value is noted, and replaced by the default, or by NaN, "", () or an empty table.
     """
 
-    def __init__(self, values: Any, file: TomlFile, path: KeyPath = (), place: str = "") -> None:
+    def __init__(self, values: Any, file: TomlFile, path: KeyPath = (), place: str = "", like: str = "") -> None:
         self.file, self.path, self.place, self.asked = file, path, place, dict[str, None]()
         self.values: dict[str, Any] = values if isinstance(values, dict) else {}
         self.opened: list[TomlTable] = []  # tables within this table that were asked for
         if not isinstance(values, dict):
-            self.problem(f"must be a table, not {excerpt(values)}")
+            self.problem(f"must be a table{like and f' such as {like}'}, not {excerpt(values)}")
 
     def __contains__(self, key: str) -> bool:
         self.asked[key] = None
@@ -180,10 +180,10 @@ class TomlTable:
         value = self.take(key, default, (list,), expected, lambda value: value and all(x in [*choices] for x in value))
         return tuple(value or ())
 
-    def table(self, key: str) -> "TomlTable":
-        """A table within this table; an empty table if the key is missing."""
+    def table(self, key: str, like: str = "") -> "TomlTable":
+        """A table within this table; an empty table if the key is missing.  `like` is an example, for messages."""
         self.asked[key] = None
-        self.opened.append(TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key)))
+        self.opened.append(TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key), like))
         return self.opened[-1]
 
     def subtables(self) -> list[tuple[str, "TomlTable"]]:
