@@ -72,7 +72,7 @@ class LogTable:
         """The lines of the [[log]]; all of them comments if nothing in the log can be used."""
         paths = [in_toml(path) for path in paths_in(self.draft.files, self.folder)]
         join = f"join = [{', '.join(paths)}]  # one signal per file"
-        period = "# period = 10.0  # [s] estimated from the data; a given value is checked"
+        period = "# period = 10.0  # [s] estimated from the data; in an identification log, a given value is checked"
         block = [
             "[[log]]",
             f"name = {in_toml(self.name)}",
@@ -82,7 +82,7 @@ class LogTable:
             *self._rate(),
             "# skip = 1.0  # [s] start-up transient to leave out",
             "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out",
-            self._contact(),
+            *self._contact(),
             "[log.channels]",
             *self._channels(),
             "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i",
@@ -149,13 +149,13 @@ class LogTable:
         if timing.remark:
             yield f"# CHECK: {timing.remark}"
 
-    def _contact(self) -> str:
+    def _contact(self) -> list[str]:
         if not self.draft.touching:
-            hint = "all else is free, unless free = [[0.0, 5.0]] is stated"
-            return f"# contact = [[12.0, 14.5]]  # [s] of contact; {hint}"
+            contact = "# contact = [[12.0, 14.5]]  # [s] of contact; without `free`, all else counts as free"
+            return [contact, "# free = [[0.0, 5.0]]  # [s] when nothing touched the arm, as far as you know"]
         if reason := _touches_throughout(self.draft):
-            return f'contact = "all"  # {reason}'
-        return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'
+            return [f'contact = "all"  # {reason}']
+        return ['# contact = "all"  # if every sample is in contact; otherwise contact is detected']
 
     def _without_joint(self) -> dict[str, str]:
         """Symbols by name of channels named as those of a joint, but of none of the robot's, while it lacks some."""
