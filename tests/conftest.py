@@ -152,6 +152,8 @@ SLOW: dict[str, dict[str, int]] = {
     "guide/test_notebook.py": {},
     "guide/test_tutorials.py": {},
     "haptics/test_feel.py": {
+        "test_a_device_that_scales_motion_and_force_renders_a_stiffness_scaled_by_both": 0,
+        "test_a_file_with_the_lines_that_the_report_shows_has_the_limits_of_the_report": 0,
         "test_a_stated_stiffness_takes_the_place_of_the_measured_one": 0,
         "test_the_filter_s_noise_is_the_joint_s": 0,
     },
@@ -216,8 +218,11 @@ SLOW: dict[str, dict[str, int]] = {
     },
     "simulation/test_thesis_study.py": {},
     "test_arrays.py": {
+        "test_a_constant_offset_is_subtracted_where_free_windows_are_given": 0,
+        "test_a_saved_study_gives_the_numbers_of_the_arrays_and_a_stream": 0,
         "test_data_frames_give_the_numbers_of_arrays_with_joints_by_their_names": 0,
         "test_nothing_is_printed_and_the_folder_is_removed_with_the_object": 0,
+        "test_settings_are_saved_and_a_robot_of_no_file_is_not": 0,
     },
     "test_averaging.py": {
         "test_a_period_of_any_length_is_found_to_its_stated_uncertainty": 0,
@@ -241,6 +246,9 @@ SLOW: dict[str, dict[str, int]] = {
     "test_design.py": {
         "test_a_chain_that_no_table_describes_has_links_without_parameters": 0,
         "test_a_robot_of_any_number_of_joints_has_a_design": 0,
+    },
+    "test_error_band.py": {
+        "test_an_unseen_log_is_covered_overall_and_at_every_speed": 2,
     },
     "test_estimation.py": {
         "test_a_joint_is_fitted_anew_at_most_twenty_times_however_many_its_logs_are": 0,
