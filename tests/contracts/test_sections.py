@@ -24,6 +24,8 @@ from davinci_forces.records import (
     Identifiability,
     Load,
     LogSummary,
+    Motion,
+    PathShare,
     PeriodResidual,
     Prediction,
     Push,
@@ -520,6 +522,11 @@ def test_the_paragraph_for_a_paper_names_filter_and_smoother_the_data_and_each_j
     summaries = [s for s in full.catalogue.records(LogSummary) if s.log in logs]
     data = f"all motion in {len(summaries)} simulated logs at 50 Hz"
     assert f"{data}, {sum(s.duration for s in summaries):.0f} s in all (again, pitch, roll, slide: 5 periods of" in text
+    motions = [m for m in full.catalogue.records(Motion) if m.log in logs]
+    half = [replace(m, standing=(np.arange(len(m)) < len(m) / 2).astype(np.int64)) for m in motions]
+    records = lambda kind: half if kind is Motion else full.catalogue.records(kind)
+    moving = sum(s.duration for s in summaries) / 2
+    assert f"{data}, {moving:.0f} s in all (" in paragraph(replace(full, catalogue=Catalogue(records)))
     for joint, fit in fits.items():
         [one] = re.findall(rf"{joint.replace('_', ' ')}: (.*?)[;.] ?(?:instrument|hand|For)", text)
         assert f"({len(fit)} parameters, " in one
@@ -721,18 +728,30 @@ def test_narrow_bands_of_several_joints_are_one_caveat(full: Context):
     [(_, text)] = caveats.looks_at_narrow_bands(full, narrow)
     start = f"**Hand roll and Hand pitch, {narrow[0].space.log}**: the 95 % band is too narrow: it covers only "
     assert text.startswith(f"{start}70 % and 50 % of free-space samples.")
+    about, log = without(full.catalogue, PathShare), narrow[0].space.log
+    some = full.catalogue.records(PathShare)[0]
+    paths = [replace(some, log=log, joint=t.joint, speed_ratio=x) for t, x in zip(narrow, (1.1, 1.4), strict=True)]
+    fast = replace(full, catalogue=Catalogue(lambda kind: paths if kind is PathShare else about.records(kind)))
+    [(_, text)] = caveats.looks_at_narrow_bands(fast, narrow)
+    assert "faster than in any fitted log, so the model extrapolates: Hand pitch 1.4 times." in text
     narrow[1] = replace(narrow[1], space=replace(narrow[1].space, log="other"))
     [(_, text)] = caveats.looks_at_narrow_bands(full, narrow)
     assert text.startswith(f"**Hand roll in {narrow[0].space.log} and Hand pitch in other**: ")
     assert list(caveats.looks_at_narrow_bands(full, trusts(full, hand_roll=0.05))) == []
 
 
-def test_page_one_states_the_level_of_a_push_that_is_held(full: Context):
+def test_page_one_states_the_level_of_a_push_that_is_held_and_the_impulse_of_a_short_one(full: Context):
     [contact] = full.catalogue.select(Contact, log="push", joint="hand_roll")
     for share, is_held in ((0.95, True), (0.75, False)):
         held = replace(contact, peak=-contact.peak, middle_mean=-share * contact.peak)
         number = full.number("contact.push.hand_roll.1.middle_mean", 3)
         assert (f" s, held at {number})" in summary.peaks_in_words(full, [held])) == is_held
+    [track] = full.catalogue.select(Track, log="push", joint="hand_roll")
+    short = replace(
+        held, peak=-contact.peak, middle_mean=-contact.peak, duration=0 * contact.duration + 1.9 * track.smooth_rise
+    )
+    number = full.number("contact.push.hand_roll.1.impulse", 3)
+    assert f" s, impulse {number})" in summary.peaks_in_words(full, [short])
 
 
 def test_the_figure_of_page_one_shows_a_contact_log_before_a_free_one_in_which_a_contact_was_found(full: Context):
@@ -1252,3 +1271,16 @@ def test_a_trajectory_that_exceeds_a_limit_is_warned_of_and_each_curve_and_limit
             assert [mark.label for mark in panel.marks] == [*names, "limits" if symbol == "q" else "", ""]
             assert all(line.y is getattr(e, symbol) for line, e in zip(lines, shown, strict=True))
             assert [end.y for end in ends] == [*getattr(limits, symbol)]
+
+
+def test_a_choice_that_errs_surely_more_than_the_plain_model_says_what_to_compare(full: Context):
+    used, plain = full.shown_fit("hand_roll"), full.fit_named("independent.lse", "hand_roll")
+    for size, is_worse in ((0.01, True), (100.0, False)):
+        less = {
+            key: replace(number, value=size, std=0.001)
+            for key, number in full.results.items()
+            if re.fullmatch(r"predict\..*\.hand_roll\.independent\.lse\.relative_error", key)
+        }
+        about = replace(full, results=Results(full.results | less))
+        text = joints.compared_with_plain(about, "hand_roll", used, plain)
+        assert text.endswith('did not help: compare `fit = "independent.lse"` in study.toml.') == is_worse

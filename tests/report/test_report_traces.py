@@ -93,7 +93,7 @@ def test_a_figure_holds_so_many_points_of_a_long_mark_and_knows_how_many_there_w
     assert figure.samples == 3_000_010
     assert result.samples <= 1000
     note = thinning_note(figure.samples, result.samples)
-    assert "3\N{NARROW NO-BREAK SPACE}000\N{NARROW NO-BREAK SPACE}010 samples" in note
+    assert "3\N{NARROW NO-BREAK SPACE}000\N{NARROW NO-BREAK SPACE}010 of all curves" in note
 
 
 def test_short_marks_stay_whole_beside_long_ones() -> None:

@@ -59,8 +59,8 @@ def best_rows(choice: Choice) -> list[int]:
 
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of the candidates in these rows of a choice; the chosen one is bold."""
-    header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Inertia > 0")
-    caption += " Errors: relative residuals, with noise. Inertia > 0: it is positive definite along all trajectories."
+    header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Total inertia > 0")
+    caption += f" {explanation('choice-table')}"
     cells = []
     for i in rows:
         name, physical = str(choice.candidate[i]), "yes" if choice.physical[i] else "no"

@@ -77,9 +77,12 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
 
 
 def alarm_levels(context: Context) -> str:
-    """The alarm level of each joint, in words."""
+    """The alarm level of each joint in words, and what its static friction adds at standstill."""
+    tracks = sorted(context.catalogue.records(Track), key=lambda track: track.static_friction)
+    adds = {track.joint: f" + {context.size(track, 'static_friction')}" for track in tracks}  # the largest comes last
     joints = [threshold.joint for threshold in context.catalogue.records(Threshold)]
-    return ", ".join(f"{title(j).lower()} {context.number(f'threshold.{j}.alarm_level', 3, std=None)}" for j in joints)
+    levels = [context.number(f"threshold.{joint}.alarm_level", 3, std=None) for joint in joints]
+    return ", ".join(f"{title(j).lower()} {level}{adds.get(j, '')}" for j, level in zip(joints, levels, strict=True))
 
 
 def largest(contacts: list[Contact]) -> tuple[int, ...]:

@@ -111,7 +111,7 @@ def data_in_words(context: Context, fits: Sequence[Fit]) -> Iterator[str]:
         names = {log for fit in fits if bool(fit.periods) is is_averaged for log in fit.logs}
         seconds, rates, motions = 0.0, list[float](), dict[str, list[str]]()
         for summary in (summary for summary in context.catalogue.records(LogSummary) if summary.log in names):
-            used, motion, key = summary.duration, "no period", f"period.{summary.log}"
+            used, motion, key = moving_time(context, summary.log), "no period", f"period.{summary.log}"
             if key in context.results:
                 periods = round(context.results[f"{key}.periods"].value)
                 used = periods * context.results[key].value if is_averaged else used
@@ -124,6 +124,12 @@ def data_in_words(context: Context, fits: Sequence[Fit]) -> Iterator[str]:
             each = {motion: " each" * (len(logs) > 1 and motion[0].isdigit()) for motion, logs in motions.items()}
             listed = "; ".join(f"{', '.join(sorted(logs))}: {motion}{each[motion]}" for motion, logs in motions.items())
             yield f"{data} {count(len(rates), kind)} at {rate} Hz, {seconds:.0f} s in all ({listed})"
+
+
+def moving_time(context: Context, log: str) -> float:
+    """The time [s] of a log in which a joint moved and was measured, which is fitted where nothing is averaged."""
+    motions = [motion for motion in context.catalogue.select(Motion, log=log) if not motion.at_rest]
+    return max((float(sum((of.standing == 0) & (of.filled == 0))) / of.rate for of in motions), default=0.0)
 
 
 def unseen_score(context: Context, joint: str) -> str:

@@ -110,8 +110,8 @@ def thin_figure(figure: AnyFigure, limit: int) -> AnyFigure:
 def thinning_note(samples: int, shown: int) -> str:
     """The remark below the caption of a figure that shows so many points of its samples."""
     if shown == samples:
-        return f"All {_group_digits(samples)} samples are shown."
-    return f"Min–max envelope of {_group_digits(samples)} samples in {_group_digits(shown)} points."
+        return f"All {_group_digits(samples)} points are shown."
+    return f"Min–max envelopes: {_group_digits(shown)} points for the {_group_digits(samples)} of all curves."
 
 
 def _share_points(sizes: list[int], limit: int) -> list[int]:

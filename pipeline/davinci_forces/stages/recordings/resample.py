@@ -192,7 +192,8 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
             if what == "positions" and max(least - low, high - most) > FAR_OVER_LIMITS * (most - least):
                 severity = "warning"
     if beyond:
-        zero = "the zero of positions (`offset`), on which gravity and forces at the tip depend"
+        depends = "gravity and forces at the tip depend" if joint.kind is Kind.REVOLUTE else "forces at the tip depend"
+        zero = f"the zero of positions (`offset`), on which {depends}"
         other = zero if beyond[0].startswith("positions") else "the `rate`"  # an offset changes no velocity
         remedy = f"correct the units, or {other}, or `limits` in [robot_overrides], by which `excite` designs"
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"

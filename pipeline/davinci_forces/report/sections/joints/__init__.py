@@ -93,10 +93,13 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     if all(p.role == "identification" for p in predictions):
         return text
     worst = max(of_free_motion(context, predictions), key=lambda p: p.relative_error)
-    before = context.number(f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error", 3)
+    of_plain = f"predict.{worst.log}.{joint}.{plain.model}.{plain.estimator}.relative_error"
+    before, std = context.number(of_plain, 3), context.results[of_plain].std or 0.0
+    is_worse = worst.relative_error - context.results[of_plain].value > 2.0 * np.hypot(std, worst.relative_error_std)
+    no_help = f' There the choice did not help: compare `fit = "{plain.model}.{plain.estimator}"` in study.toml.'
     after = context.number(f"{worst.prefix}.relative_error", 3)
     where = f"Of the logs not fitted, its relative residual (noise included) is largest in {literal(worst.log)}"
-    return f"{text} {where}: {after}, and {before} by the plain model."
+    return f"{text} {where}: {after}, and {before} by the plain model.{no_help * bool(is_worse)}"
 
 
 def implausible(fits: list[Fit], joint: str) -> Iterator[Verdict]:

@@ -22,6 +22,7 @@ LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes neg
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 MAX_NARROW = 2.4  # largest weight of a narrow band: less than that of an error for which a joint's verdict is a problem
+FASTER = 1.2  # speed over that of all fitted logs, which may be why a band is too narrow
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 
 
@@ -175,6 +176,10 @@ def looks_at_narrow_bands(context: Context, trusts: list[Trust]) -> Iterator[tup
     text = f"**{where}**: the 95 % band is too narrow: it covers only {shares} of free-space samples."
     if not all(t.share > verdicts.CAUTION for t, _ in narrow):  # else more logs do not calibrate it: the model is wrong
         text += f" {explanation('narrow-band')}"
+    reach = {(share.log, share.joint): share.speed_ratio for share in context.catalogue.records(PathShare)}
+    ratios = {t.joint: reach.get((space.log, t.joint), 0.0) for t, space in narrow}
+    faster = [f"{title(joint)} {ratio:.2g} times" for joint, ratio in ratios.items() if ratio > FASTER]
+    text += f" There it is faster than in any fitted log, so the model extrapolates: {as_list(faster)}." * bool(faster)
     others = (
         offset_remedy(context, p)
         for t, space in narrow
