@@ -420,7 +420,9 @@ def test_the_guide_explains_every_term_of_page_one(term):
     assert len(page.text) < 400
 
 
-@pytest.mark.parametrize(("topic", "meant"), [("review", "compare"), ("labveiw", "labview")])
+@pytest.mark.parametrize(
+    ("topic", "meant"), [("review", "compare"), ("labveiw", "labview"), ("limits", ".*robot-file")]
+)
 def test_a_topic_that_is_no_page_names_the_page_whose_title_has_it_or_that_is_spelled_alike(topic, meant):
     with pytest.raises(BadRequest, match=f"did you mean {meant}"):
         guide.page(topic)

@@ -14,7 +14,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.guide import generated
 
 FOLDER = Path(__file__).parent
-NOTEBOOKS = "notebooks"  # their pages are made from the notebooks beside this module
+CHANGES, NOTEBOOKS = "changes", "notebooks"  # folders; pages of the second are made from *.ipynb beside this module
 GROUPS = {  # folder -> its heading, in the order of the list
     "tutorials": "Tutorials: learn by doing",
     NOTEBOOKS: "Notebooks: from Python",
@@ -22,7 +22,7 @@ GROUPS = {  # folder -> its heading, in the order of the list
     "reference": "Reference: every name, from the code",
     "explanation": "Explanation: how and why",
     "": "The project",
-    "changes": "Changes, by version",
+    CHANGES: "Changes, by version",
 }
 INDEX, TERMS = "index", "terms"  # topics of the page that lists the others, and of that which explains terms
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?:[\w./-]*/)?([\w.-]+)\.(?:md|ipynb)(?:#([\w-]+))?\)")  # a page
@@ -84,9 +84,10 @@ def page(topic: str) -> Page:
     if rows:
         lines = (f"**`{topic}`** (topic `{where}`): {row.replace(' |', ';').strip()}" for where, row in rows)
         return replace(by_topic[rows[0][0]], write=lambda: "\n\n".join(lines))
-    titled = [t for t, page in by_topic.items() if topic.lower() in f"{t} {page.title}".lower()]
-    times = {t: len(re.findall(words, page.text, re.IGNORECASE)) for t, page in by_topic.items()}
-    holding = sorted(filter(times.get, times), key=times.__getitem__, reverse=True)
+    lasting = {t: page for t, page in by_topic.items() if page.folder != CHANGES}
+    titled = [t for t, page in lasting.items() if topic.lower() in f"{t} {page.title}".lower()]
+    share = {t: len(re.findall(words, page.text, re.IGNORECASE)) / len(page.text) for t, page in lasting.items()}
+    holding = sorted(filter(share.get, share), key=share.__getitem__, reverse=True)
     close = titled[:3] or holding[:3] or get_close_matches(topic.lower(), by_topic, 3, 0.4)
     meant = f"did you mean {' or '.join(close)}? " if close else ""
     raise BadRequest(f"the guide has no topic {topic!r}; {meant}`davinci-forces guide` lists all topics")
