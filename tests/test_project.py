@@ -11,7 +11,8 @@ from importlib.util import find_spec
 
 import pytest
 
-from tests.conftest import MEDIUM, ROOT
+from tests.conftest import ROOT
+from tests.durations import MEDIUM, SLOW
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 MAKEFILE = (ROOT / "Makefile").read_text()
@@ -102,11 +103,12 @@ def test_benchmarks_and_long_studies_stay_out_of_the_quick_run():
     assert re.search(r"^PYTEST := .*-n \$\(WORKERS\)", MAKEFILE, re.M)
 
 
-@pytest.mark.parametrize("file", MEDIUM)
-def test_tests_that_are_called_medium_are_there(file):
+@pytest.mark.parametrize("file", {**MEDIUM, **SLOW})
+def test_tests_that_are_called_medium_or_slow_are_there(file):
     module = ast.parse((ROOT / "tests" / file).read_text(encoding="utf-8"))
     there = {node.name for node in module.body if isinstance(node, ast.FunctionDef)}
-    assert {name.partition("[")[0] for name in MEDIUM[file]} <= there
+    named = (*MEDIUM.get(file, ()), *SLOW.get(file, ()))
+    assert {name.partition("[")[0] for name in named} <= there
 
 
 def collected(*arguments: str) -> str:
