@@ -1099,12 +1099,18 @@ def test_a_found_contact_is_outside_windows_only_where_some_are_stated(full: Con
 def test_the_poor_agreement_of_joints_on_a_mass_is_in_its_verdict_and_on_page_one(full: Context):
     [of, *_] = full.catalogue.records(Weight)
     for agreement, is_told in ((0.015, True), (0.5, False)):
-        poor = replace(of, agreement=agreement)
+        poor = replace(of, agreement=agreement, joint_offset=np.zeros_like(of.joint_offset))
         records = Catalogue(lambda kind, poor=poor: [poor] if kind is Weight else full.catalogue.records(kind))
         about = replace(full, catalogue=records)
         mass, clause = full.number(f"weight.{of.log}.mass", 3), " (its joints agree poorly: p-value 0.015)" * is_told
         assert f"estimated from the efforts is {mass}{clause}, " in weight_section.verdict(about, poor).text
         assert [f"mass {mass}{clause}, stated " in line for line in opening.masses(about)] == [True]
+    unknown = replace(of, joint_offset=np.full_like(of.joint_offset, np.nan))
+    about = replace(
+        full, catalogue=Catalogue(lambda kind: [unknown] if kind is Weight else full.catalogue.records(kind))
+    )
+    [line] = opening.masses(about)
+    assert f"mass {mass} (an offset of the effort would count as mass)" in line
 
 
 def test_the_force_at_the_tip_says_what_is_added_to_its_peak(full: Context):

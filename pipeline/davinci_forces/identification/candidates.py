@@ -27,6 +27,7 @@ from davinci_forces.robots.robot import Joint, Robot
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
 WEIGHTS_RIDGE = 1e-3  # of the fits whose residual variances weigh the joints
 POSES = 50  # number of poses of each log at which the inertia has to be positive definite
+SPRING = re.compile(r"friction \d+")  # a presliding friction with the number of its spring
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Library:
 
 def identity(parameter: Parameter) -> tuple[str, float]:
     """The name and the scale of a parameter, without the number of a presliding friction, which differs by model."""
-    return re.sub(r"friction \d+", "friction", parameter.name), parameter.scale
+    return SPRING.sub("friction", parameter.name), parameter.scale
 
 
 class CandidatePart(NamedTuple):

@@ -13,6 +13,7 @@ prefix itself.  With `{row}` (its number from 1), `{name}` or `{slug}` in the pr
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 from weakref import WeakValueDictionary
 
@@ -66,11 +67,13 @@ class Record:
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
 
     @classmethod
+    @cache
     def columns(cls) -> Names:
         """Return the names of the column fields."""
         return tuple(f.name for f in fields(cls) if f.type in COLUMN_DTYPES)  # type: ignore[arg-type]
 
     @classmethod
+    @cache
     def scalars(cls) -> Names:
         """Return the names of the scalar fields."""
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cache
 from typing import NamedTuple
 
 from numpy.typing import ArrayLike
@@ -29,6 +30,7 @@ class Kind(Enum):
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
 
+    @cache
     def unit(self, template: str, measured: str = "", is_geared: bool = True) -> str:
         """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint.
 

@@ -118,9 +118,10 @@ def masses(context: Context) -> Iterator[str]:
     for weight in context.catalogue.records(Weight):
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
+        offset = " (an offset of the effort would count as mass)" * bool(np.isnan(weight.joint_offset).all())
         level, why = grade_of_mass(context, weight)
         stated += ", which seems to have given a torque constant in use: no test of it" * (why == "taken")
-        yield f"**{literal(weight.log)}**: mass {mass}{doubt_of_mass(weight)}{stated}{verdict_at_end(level)}"
+        yield f"**{literal(weight.log)}**: mass {mass}{offset}{doubt_of_mass(weight)}{stated}{verdict_at_end(level)}"
 
 
 def verdict_at_end(level: Level) -> str:
