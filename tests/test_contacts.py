@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from davinci_forces.maths.contact.detection import (
     FALSE_ALARMS,
+    Event,
     alarm_level,
     events,
     free_motion_statistics,
@@ -215,6 +216,19 @@ def test_a_push_that_is_held_reads_its_level_in_the_middle_of_the_contact():
         assert 0.0 < contact.middle_mean_std[0] < 0.1
         assert contact.mean[0] < 4.6
         assert abs(contact.peak[0] - 5.0) > 3 * contact.middle_mean_std[0]
+
+
+def test_the_error_of_the_middle_of_a_triangle_contains_those_of_onset_and_release():
+    """Of a push that is held the middle does not depend on them; of a triangle it does."""
+    edges, none = Event(19.0, 0.2, 21.0, 0.1), Event(19.0, 0.0, 21.0, 0.0)
+    held, triangle = 3.0 * (np.abs(T - 20.0) < 1.5), 3.0 * np.clip(1 - np.abs(T - 20.0), 0, None)
+    free = np.abs(T - 20.0) > 2.0
+    for push, by_onset, by_release in ((held, 0.0, 0.0), (triangle, 0.072, 0.037)):  # half of the change of the mean
+        of = track(noise(std=0.02) + push, std=0.02)
+        value, std = measure.middle_effort(of, edges, free, 0.0 * T)
+        known, least = measure.middle_effort(of, none, free, 0.0 * T)
+        assert value == known
+        assert np.sqrt(std**2 - least**2) == pytest.approx(np.hypot(by_onset, by_release), abs=0.01)
 
 
 def test_a_peak_is_no_smaller_than_the_means_which_nothing_smooths():

@@ -115,7 +115,7 @@ def contacts(
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
             edges = np.interp([onset, release], track.t, track.tau_ext_smooth) * (onset_std, release_std)
-            middle = middle_effort(track, (onset, release), free, friction_std) or summary[2:4]
+            middle = middle_effort(track, Event(*times), free, friction_std) or summary[2:4]
             impulse = summary.impulse, float(np.linalg.norm([summary.impulse_std, *(() if stated else edges)]))
             # A short peak is flattened below the means; its error stays.
             peak = max(summary.peak, summary.mean, middle[0], key=lambda x: x * np.sign(summary.peak))
@@ -140,16 +140,27 @@ def steady_effort(track: Track) -> tuple[Array, Array]:
     return track.tau_ext_smooth, detection.without_rounding(track.tau_ext_smooth_std, track.tau_ext_rounding)
 
 
-def middle_effort(track: Track, contact: Window, free: Booleans, friction_std: Array) -> tuple[float, float] | None:
+def middle_effort(track: Track, event: Event, free: Booleans, friction_std: Array) -> tuple[float, float] | None:
     """Mean effort over the middle half of a contact, and its standard error; None without a sample in it.
 
-    A push that is held has risen by then, unlike in the mean, and noise does not raise it, as it does a peak.
+    A push that is held has risen by then, unlike in the mean, and noise does not raise it, as it does a peak.  The
+    error includes those of onset and release: half the change of the mean when either moves from one side to the other.
     """
-    quarter = 0.25 * (contact[1] - contact[0])
-    middle = contact[0] + quarter, contact[1] - quarter
-    if is_outside(track.t, [middle]).all():
+    onset, onset_std, release, release_std = event
+
+    def middle(start: float, end: float) -> Window:
+        return 0.75 * start + 0.25 * end, 0.25 * start + 0.75 * end
+
+    def change(*windows: Window) -> float:
+        first, last = (track.tau_ext_direct[~is_outside(track.t, [middle(*window)])] for window in windows)
+        return 0.5 * float(last.mean() - first.mean()) if len(first) and len(last) else 0.0
+
+    if is_outside(track.t, [middle(onset, release)]).all():
         return None
-    return detection.mean_effort(track.t, track.tau_ext_direct, middle, free, friction_std)
+    value, std = detection.mean_effort(track.t, track.tau_ext_direct, middle(onset, release), free, friction_std)
+    by_onset = change((onset - onset_std, release), (onset + onset_std, release))
+    by_release = change((onset, release - release_std), (onset, release + release_std))
+    return value, float(np.linalg.norm([std, by_onset, by_release]))
 
 
 def hidden_peak(track: Track, onset: float) -> str:
