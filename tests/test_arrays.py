@@ -13,14 +13,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import davinci_forces
+from davinci_forces import arrays
 from davinci_forces.arrays import IdentifiedArm
 from davinci_forces.errors import BadRequest, BadRobot, NotAFile
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, JointModel, Record, Track, store
+from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, FreeSpace, JointModel, PathShare, Record, Track, store
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.runner import runs
 from davinci_forces.study import reading
 from tests import arm
+from tests.report.report_records import free_space
 
 SHORT = {"periods": 6, "rate": 50.0}
 JOINT = "hand_roll"
@@ -279,9 +281,48 @@ def test_a_robot_or_joint_that_is_unknown_is_named(change, text):
 
 @pytest.mark.parametrize("ask", ["predict", "external_effort"])
 def test_wrong_arrays_of_a_new_log_are_refused(identified, ask):
-    arrays = [PUSHED.t[:-1], PUSHED.q, PUSHED.tau][: 2 if ask == "predict" else 3]
-    with pytest.raises(BadRequest, match=r"q has shape \(780,\)"):
-        getattr(identified, ask)(*arrays)
+    given = [PUSHED.t[:-1], PUSHED.q, PUSHED.tau][: 2 if ask == "predict" else 3]
+    with pytest.raises(BadRequest, match=r"q has shape \(780,\)") as refused:
+        getattr(identified, ask)(*given)
+    assert ("tau" in str(refused.value)) == (ask == "external_effort")
+
+
+@pytest.mark.parametrize(
+    ("windows", "text"),
+    [
+        ([10, 14], "contact is [10, 14]; give [[start, end], ...] in s"),
+        ([[10, "end"]], "give [[start, end], ...] in s"),
+        (np.array([[1e9, 1e9 + 2]]), "s; count from its first sample"),
+        ([[10, 50]], "contact [10.0, 50.0] ends after the log, of 15.58 s"),
+    ],
+)
+def test_windows_that_are_none_or_not_of_the_log_are_refused(identified, windows, text):
+    with pytest.raises(BadRequest) as refused:
+        identified.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, contact=windows)
+    assert text in str(refused.value)
+
+
+def test_windows_may_be_an_array():
+    assert arrays.windows_of("free", np.array([[1, 2], [3.5, 4]]), PUSHED.t) == [[1.0, 2.0], [3.5, 4.0]]
+
+
+def test_columns_that_name_no_joint_are_not_taken_for_joints_in_their_order():
+    frame = pd.DataFrame({"outer_pitch": FIRST.q, "outer_yaw": FIRST.q})
+    with pytest.raises(BadRequest, match=r"columns outer_pitch, outer_yaw, but the joints of .* are hand_roll"):
+        davinci_forces.identify(arm.ARM, FIRST.t, frame, frame)
+    assert arrays.joints_of(arm.ARM, frame, ["hand_pitch", "hand_roll"]) == ["hand_pitch", "hand_roll"]
+    assert arrays.joints_of(arm.ARM, pd.DataFrame(np.zeros((60, 3))), None) == [j.name for j in arm.ARM.joints]
+
+
+def test_a_joint_that_is_faster_than_fitted_and_a_narrow_band_are_doubted():
+    share = PathShare(arrays.NEW, JOINT, "contact", 0.5, 1.0, 1.3, 0.0)
+    slow, other = replace(share, speed_ratio=1.1), replace(share, log="identification")
+    space = free_space(log=arrays.NEW, joint=JOINT, coverage=0.85)
+    wide, filtered = replace(space, coverage=0.94), replace(space, filter="ekf")
+    records = {PathShare: [share, slow, other], FreeSpace: [space, wide, filtered]}
+    fast, narrow = arrays.doubts(records.__getitem__)
+    assert fast == "hand_roll moves 1.3 times as fast as in any fitted log, so its model extrapolates"
+    assert narrow.endswith("too narrow: it covers only 85 % of this log's free motion")
 
 
 def test_the_example_in_the_docstring_runs():

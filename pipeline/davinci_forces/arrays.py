@@ -19,7 +19,20 @@ from davinci_forces.files import read_bytes, write_folder
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.identification.joint_models import Identified
 from davinci_forces.maths.arrays import Array
-from davinci_forces.records import AnyRecord, Choice, Contact, Diagnostic, ErrorBand, Fit, JointModel, Track, store
+from davinci_forces.records import (
+    AnyRecord,
+    Choice,
+    Contact,
+    Diagnostic,
+    ErrorBand,
+    Fit,
+    FreeSpace,
+    JointModel,
+    PathShare,
+    Track,
+    store,
+)
+from davinci_forces.records.forces import FASTER, MIN_COVERAGE, SMOOTHER
 from davinci_forces.report.content import Number
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
@@ -80,13 +93,29 @@ def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[st
     Raises BadRequest if neither names nor the number of columns tell the joints; BadRobot if there is no such joint.
     """
     names = [joint.name for joint in robot.joints]
-    labels = [str(label) for label in q.columns] if isinstance(q, pd.DataFrame) else []
+    labels = [label for label in getattr(q, "columns", ()) if isinstance(label, str)]
     width = 1 if np.ndim(q) == 1 else np.shape(q)[1] if np.ndim(q) == 2 else 0
-    chosen = list(joints) if joints is not None else labels if labels and set(labels) <= set(names) else names
+    if joints is None and not set(labels) <= set(names):
+        known = f"q has the columns {', '.join(labels)}, but the joints of {robot.name} are {', '.join(names)}"
+        raise BadRequest(f"{known}; rename the columns, or say with joints=[...] which joint each of them is")
+    chosen = list(joints) if joints is not None else labels or names
     if len(chosen) != width:
         count = f"q has shape {np.shape(q)}, but there are {len(chosen)} joints: {', '.join(chosen)}"
         raise BadRequest(f"{count}; give one column a joint, and name other joints with joints=[...]")
     return [robot.joint(name).name for name in chosen]
+
+
+def windows_of(name: str, windows: Windows, t: Array) -> list[list[float]]:
+    """Windows [[start, end], ...] [s] as Python's numbers; raises BadRequest where they are none, or not of the log."""
+    try:
+        found = [[float(start), float(end)] for start, end in windows]
+    except (TypeError, ValueError) as error:
+        raise BadRequest(f"{name} is {windows!r}; give [[start, end], ...] in s from the first sample") from error
+    length = float(t[-1] - t[0])
+    for window in found:
+        if window[1] > length + 2.0 * float(t[1] - t[0]):
+            raise BadRequest(f"{name} {window} ends after the log, of {length:.6g} s; count from its first sample")
+    return found
 
 
 def columns_of(
@@ -177,7 +206,8 @@ class IdentifiedArm:
         BadRequest
             If the arrays are wrong, or no joint has a model.
         """
-        columns = self._columns(t, q, np.zeros(np.shape(q)), dq)
+        columns = self._columns(t, q=q, dq=dq)
+        columns |= {f"{joint}.tau": np.zeros_like(columns["time"]) for joint in self.joints}
         reading = self._run(PREDICTED, self._contact_log(NEW, columns))
         models = [model for model in reading(JointModel) if model.log == NEW]
         if not models:
@@ -203,13 +233,16 @@ class IdentifiedArm:
         Raises
         ------
         BadRequest
-            If the arrays are wrong, or no joint has a model.
+            If the arrays or windows are wrong, or no joint has a model.
         """
-        windows = {name: [[*window] for window in of] for name, of in (("free", free), ("contact", contact)) if len(of)}
-        columns = self._columns(t, q, tau, dq)
+        columns = self._columns(t, q=q, tau=tau, dq=dq)
+        given = {"free": free, "contact": contact}
+        windows = {name: windows_of(name, of, columns["time"]) for name, of in given.items() if len(of)}
         reading = self._run(MEASURED, self._contact_log(NEW, columns, windows))
         tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
-        texts = new_texts(reading)
+        texts = (*new_texts(reading), *doubts(reading))
+        for text in doubts(reading):
+            warnings.warn(text, stacklevel=2)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
         labels = tuple(self._effort_label(track.joint) for track in tracks)
@@ -291,9 +324,8 @@ class IdentifiedArm:
         refuse(table)
         return entry
 
-    def _columns(self, t: Samples, q: Samples, tau: Samples, dq: Samples) -> Columns:
-        given = {"q": [q], "tau": [tau]} | ({} if dq is None else {"dq": [dq]})
-        [columns] = columns_of([t], given, self.joints)
+    def _columns(self, t: Samples, **given: Samples) -> Columns:
+        [columns] = columns_of([t], {name: [x] for name, x in given.items() if x is not None}, self.joints)
         return columns
 
     def _contact_log(self, name: str, columns: Columns, windows: Mapping[str, Any] | None = None) -> LogEntry:
@@ -395,6 +427,17 @@ def axes_of(labels: Mapping[str, str]) -> Any:
 def new_texts(reading: Any) -> tuple[str, ...]:
     """The texts of the diagnostics of the new log."""
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
+
+
+def doubts(reading: Any) -> list[str]:
+    """What page one of a report would doubt of the new log: joints faster than fitted, bands that are too narrow."""
+    return [
+        f"{x.joint} moves {x.speed_ratio:.2g} times as fast as in any fitted log, so its model extrapolates"
+        for x in reading(PathShare) if x.log == NEW and x.speed_ratio > FASTER
+    ] + [
+        f"{x.joint}: the 95 % band is too narrow: it covers only {100 * x.coverage:.0f} % of this log's free motion"
+        for x in reading(FreeSpace) if (x.log, x.filter) == (NEW, SMOOTHER) and x.coverage < MIN_COVERAGE
+    ]  # fmt: skip
 
 
 def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Diagnostic, PathShare, Prediction, Record, Spectrum, Track, Weight
+from davinci_forces.records.forces import FASTER
 from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import literal, message
@@ -22,7 +23,6 @@ LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes neg
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 MAX_NARROW = 2.4  # largest weight of a narrow band: less than that of an error for which a joint's verdict is a problem
-FASTER = 1.2  # speed over that of all fitted logs, which may be why a band is too narrow
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 
 
@@ -177,8 +177,9 @@ def looks_at_narrow_bands(context: Context, trusts: list[Trust]) -> Iterator[tup
     if not all(t.share > verdicts.CAUTION for t, _ in narrow):  # else more logs do not calibrate it: the model is wrong
         text += f" {explanation('narrow-band')}"
     reach = {(share.log, share.joint): share.speed_ratio for share in context.catalogue.records(PathShare)}
+    most = verdicts.MAX_SPEED_RATIO  # above which it is a caveat of its own
     ratios = {t.joint: reach.get((space.log, t.joint), 0.0) for t, space in narrow}
-    faster = [f"{title(joint)} {ratio:.2g} times" for joint, ratio in ratios.items() if ratio > FASTER]
+    faster = [f"{title(joint)} {ratio:.2g} times" for joint, ratio in ratios.items() if FASTER < ratio <= most]
     text += f" There it is faster than in any fitted log, so the model extrapolates: {as_list(faster)}." * bool(faster)
     others = (
         offset_remedy(context, p)
