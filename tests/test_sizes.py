@@ -71,6 +71,7 @@ name = "m"
 moved_by = "grip"
 """
 HAPTICS = (PACKAGE / "haptics" / "haptics.toml").read_text(encoding="utf-8").replace("# strongest", "strongest")
+HAPTICS = re.sub(r"(?m)^#(?! )", "", HAPTICS)  # with the tables that a study's own estimates replace
 SHIPPED = {f"scenario {name}": (PACKAGE / "simulation" / "shipped" / f"{name}.toml").read_text() for name in
            ("davinci-demo", "davinci-filter", "davinci-joints", "davinci-thesis")}  # fmt: skip
 URDF = """<robot name="r"><link name="a"/>

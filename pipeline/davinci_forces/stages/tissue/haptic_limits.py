@@ -65,8 +65,9 @@ def run(
 
 def not_followed(scenario: FullScenario, arm_from: str) -> Diagnostic:
     """Warn that the simulated arm is unstable by itself, as with an inertia that the logs hardly determine."""
-    why, where = limits.why_unstable(scenario), "in the file that study.toml names under `haptics`"
-    text = f"arm: no limit of haptic feedback through it is computed, as {why}, {where}"
+    why, where = limits.why_unstable(scenario), "in the file that study.toml names as `haptics`"
+    template = "`davinci-forces haptics --template haptics.toml` writes one"
+    text = f"arm: no limit of haptic feedback through it is computed, as {why}, {where} ({template})"
     remedy = f"if the inertia of {arm_from} is wrong, record a faster motion, or state [arm.body]"
     return diagnostic("haptic-limits", "arm.followed", "warning", f"{text}; {remedy}")
 
