@@ -180,7 +180,7 @@ def section(**about):
         ({"k_t_limit": 300.0}, "warn", "**not stable** against the measured tissue"),
         ({"filter_lag_std": NAN}, "info", "is not rated. To measure it, record more free motion"),
         ({"k_t_limit": NAN}, "info", "no limit of the tissue's stiffness was found."),
-        ({"k_t_limit": NAN, "loop_delay": NAN}, "info", "stiffness was found through this arm."),
+        ({"k_t_limit": NAN, "loop_delay": NAN}, "info", "controller does not hold this arm; see [@runs]."),
     ],
 )
 def test_a_hand_is_said_to_be_stable_or_not_by_the_headline_and_its_interval(about, level, words):

@@ -20,7 +20,7 @@ from davinci_forces.report.sections.methods import bibliography
 from davinci_forces.report.sections.parts import trust
 from davinci_forces.report.sections.summary import fitted_joints, peaks_in_words, trust_row
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
-from davinci_forces.report.sections.summary.opening import forces_at_tip, masses
+from davinci_forces.report.sections.summary.opening import feedback, forces_at_tip, masses
 from davinci_forces.report.sections.tissue import verdict
 from davinci_forces.report.writers import render_all
 from davinci_forces.study import Study
@@ -83,6 +83,7 @@ def answer(context: Context) -> str:
     stiffness = context.catalogue.records(Stiffness)
     measured = [plain(text) for text in (*forces_at_tip(context), *masses(context))]
     measured += [f"tissue {plain(verdict(context, log).text)}" for log in stiffness]
+    measured += map(plain, feedback(context))
     if not trusts:
         message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
         return "\n".join([message, *measured]) + "\n"

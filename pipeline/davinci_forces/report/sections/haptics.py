@@ -33,7 +33,7 @@ def experiment(context: Context, responses: list[HapticResponse]) -> str:
     arm = {
         "the thesis": "that of the thesis" if thesis else "an assumed one",
         "the scenario": "that of the scenario",
-    }.get(response.arm_from, f"that of the fit of the {title(response.arm_from).lower()}, which the filter uses, too")
+    }.get(response.arm_from, explanation("haptics-fit", joint=title(response.arm_from).lower()))
     names = ("tissue_stiffness", "rendered_stiffness", "at_frequency", "felt_delay")
     true, felt, frequency, late = context.numbers("haptics", names)
     return (

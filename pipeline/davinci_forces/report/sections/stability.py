@@ -7,6 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import HandLimit, HapticMotion, StabilityLimit, Stiffness
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, literal
 from davinci_forces.report.content.marks import AnyMark, Band, Colour, HLine, Line
 from davinci_forces.report.context import Context, label
@@ -47,7 +48,10 @@ def section(context: Context, limits: list[HandLimit]) -> Iterator[Block]:
     alt = "Limits of the tissue's stiffness over the stiffness of the hand, and over the delay of the force."
     followed = bool(np.isfinite(limits[0].loop_delay))  # else only limits that need no arm are known
     panels = (map_panel(context, tissues), *[delay_panel(context, limits, tissues)] * followed)
-    yield Figure(explanation("stability-limits"), alt, panels, "stability-limits", columns=2, height=62)
+    loop = " Whole loop: the limit of each hand above over an added delay." * followed
+    hands = [f"{of.hand_mass:g} kg and {of.hand_damping:g} N s/m" for of in context.catalogue.records(StabilityLimit)]
+    caption = explanation("stability-limits", hand=as_list(hands), loop=loop)
+    yield Figure(caption, alt, panels, "stability-limits", columns=2, height=62)
     yield OnScreen("More on stability: the hand's motion", "more-stability", tuple(motions(context)))
 
 
@@ -57,8 +61,10 @@ def verdict(context: Context, limit: HandLimit, tissues: list[Stiffness]) -> Ver
     stiffest = max(tissues, key=lambda tissue: tissue.stiffness)
     tissue = context.number(f"tissue.{stiffest.log}.stiffness")
     if limit.k_t_limit != limit.k_t_limit:
-        through = " through this arm" * bool(np.isnan(limit.loop_delay))
-        return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found{through}.")
+        if np.isnan(limit.loop_delay):
+            why = "no limit was computed, as the simulated controller does not hold this arm; see [@runs]"
+            return Verdict("info", f"Hand “{name}”: {why}.")
+        return Verdict("info", f"Hand “{name}”: no limit of the tissue's stiffness was found.")
     headline, settles, needed = context.numbers(key, ("k_t_limit", "k_t_settles", "damping_needed"))
     half = NORMAL_95 * limit.k_t_limit_std  # NaN without logs: then nothing is proved
     if np.isnan(limit.filter_lag_std):
@@ -88,7 +94,7 @@ def model(context: Context, limits: list[HandLimit]) -> str:
     origin = " The thesis states no stiffness of the hand." if context.compares_with_thesis else ""
     rows = [(x.k_t_limit, x.k_t_response, x.k_t_simulated) for x in limits]
     apart = [max(row) / min(row) - 1.0 for row in rows if np.isfinite(row).all()]
-    agree = f"Here they agree within {100.0 * max(apart):.1f} %. " if apart else ""
+    agree = f"{explanation('stability-agree')} Here they agree within {100.0 * max(apart):.1f} %. " if apart else ""
     region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
     return explanation("stability", haptics=haptics, delay=delay, origin=origin, agree=agree, region=region)
 
