@@ -293,7 +293,7 @@ def test_wrong_arrays_of_a_new_log_are_refused(identified, ask):
         ([10, 14], "contact is [10, 14]; give [[start, end], ...] in s"),
         ([[10, "end"]], "give [[start, end], ...] in s"),
         (np.array([[1e9, 1e9 + 2]]), "s; count from its first sample"),
-        ([[10, 50]], "contact [10.0, 50.0] ends after the log, of 15.58 s"),
+        ([[16, 50]], "contact [16.0, 50.0] begins after the log, of 15.58 s"),
     ],
 )
 def test_windows_that_are_none_or_not_of_the_log_are_refused(identified, windows, text):

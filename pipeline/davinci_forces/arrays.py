@@ -113,8 +113,8 @@ def windows_of(name: str, windows: Windows, t: Array) -> list[list[float]]:
         raise BadRequest(f"{name} is {windows!r}; give [[start, end], ...] in s from the first sample") from error
     length = float(t[-1] - t[0])
     for window in found:
-        if window[1] > length + 2.0 * float(t[1] - t[0]):
-            raise BadRequest(f"{name} {window} ends after the log, of {length:.6g} s; count from its first sample")
+        if window[0] > length:
+            raise BadRequest(f"{name} {window} begins after the log, of {length:.6g} s; count from its first sample")
     return found
 
 

@@ -7,7 +7,7 @@ from davinci_forces.report.content import Block, Figure, Panel, Prose, Table, Ve
 from davinci_forces.report.content.marks import HLine, Line
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import explanation, section_of
-from davinci_forces.robots.robot import ControlStudy
+from davinci_forces.robots.robot import ControlStudy, Kind
 
 SHARE_DRAWN = 0.5  # of a study's time, in which it settles
 
@@ -44,8 +44,12 @@ def section(context: Context, runs: list[Control]) -> Iterator[Block]:
 
 def viscous_friction(context: Context, study: ControlStudy) -> str:
     """The friction that a study assumes, joint by joint."""
+    kinds = {joint.name: joint.kind for joint in context.study.robot.joints}  # the coordinates of a wrist turn
     values = zip(context.study.robot.coordinates, study.viscous, strict=False)
-    rubbing = [f"{value:g} in SI units at the {title(name).lower()}" for name, value in values if value]
+    rubbing = [
+        f"{value:g} {kinds.get(name, Kind.REVOLUTE).unit('{effort} s/{position}')} at the {title(name).lower()}"
+        for name, value in values if value
+    ]  # fmt: skip
     return (", ".join(rubbing) + ", and none elsewhere") if rubbing else "of none"
 
 

@@ -189,8 +189,8 @@ def is_doubtful(context: Context, contact: Contact) -> Booleans:
 def level_or_impulse(context: Context, contact: Contact, row: int) -> str:
     """The impulse of a push whose middle half is shorter than the smoother's rise; the level of one that is held."""
     key = f"contact.{contact.log}.{contact.joint}.{row + 1}"
-    [track] = context.catalogue.select(Track, log=contact.log, joint=contact.joint)
-    if contact.duration[row] < 2.0 * track.smooth_rise:
+    rises = [track.smooth_rise for track in context.catalogue.select(Track, log=contact.log, joint=contact.joint)]
+    if contact.duration[row] < 2.0 * max(rises, default=0.0):
         return f", impulse {context.number(f'{key}.impulse', 3)}"
     peak, middle = abs(contact.peak[row]), contact.middle_mean[row] * np.sign(contact.peak[row])
     is_held = middle > min(HELD * peak, max(peak - contact.peak_std[row], MIN_HELD * peak))
