@@ -122,9 +122,6 @@ SLOW: dict[str, dict[str, int]] = {
         "test_a_map_takes_little_longer_than_its_bare_solves": 0,
         "test_no_switching_at_random_grows_below_the_limit": 1,
     },
-    "logs/test_arrays.py": {
-        "test_a_dataset_that_claims_more_samples_than_its_file_can_hold_is_refused": 0,
-    },
     "logs/test_clocks.py": {
         "test_any_history_of_writes_has_the_samples_of_nptdms_and_the_times_of_a_slow_witness": 0,
     },

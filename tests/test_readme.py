@@ -468,6 +468,11 @@ def test_a_page_links_every_notebook():
         assert any(f"{notebook.name})" in text for text in texts), notebook.name
 
 
+def test_a_topic_is_one_page():
+    topics = [page.topic for page in guide.pages()]
+    assert sorted(set(topics)) == sorted(topics)
+
+
 def test_every_link_of_the_guide_s_file_leads_somewhere_in_it():
     file = guide.as_html()
     targets = set(re.findall(r'\bid="([^"]+)"', file))
