@@ -24,9 +24,9 @@ TOLERANCE = 1e-6  # relative; times are rounded to nanoseconds
 
 
 def simulated(folder: Path) -> dict[str, str]:
-    """The text of each [[log]] of a study that is simulated in the folder; of the excitations the first minute."""
+    """The text of each [[log]] of a study that is simulated in the folder; of the excitations the first 40 s."""
     scenario = load(TWO_FRICTIONS)
-    logs = tuple(replace(log, duration=min(log.duration, 60.0)) for log in scenario.logs if log.name in LOGS)
+    logs = tuple(replace(log, duration=min(log.duration, 40.0)) for log in scenario.logs if log.name in LOGS)
     study_folder.write(replace(scenario, logs=logs), folder, False, lambda _: None)
     _, *tables = re.split(r"^\[\[log\]\]\n", (folder / "study.toml").read_text(), flags=re.M)
     return {re.search(r'name = "(.*)"', table)[1]: table for table in tables}

@@ -120,7 +120,7 @@ def test_no_cell_of_any_table_leaves_the_page() -> None:
     def words() -> str:
         return " ".join("".join(rng.choices("abcW_-/", k=rng.randint(1, 60))) for _ in range(rng.randint(1, 4)))
 
-    sizes = [(rng.randint(1, 12), rng.randint(1, 4)) for _ in range(40)]
+    sizes = [(rng.randint(1, 12), rng.randint(1, 4)) for _ in range(20)]
     tables = [
         Table(
             "T",
