@@ -621,7 +621,7 @@ def test_free_motion_of_a_fitted_log_raises_the_alarm_level_unless_it_is_far_fro
     fitted = slow_noise(0.05) + np.where((T >= 30) & (T <= 31), 0.2, 0.0)
     about, other = entry(role="identification"), entry(role="validation")
 
-    def threshold(effort):
+    def threshold(effort, about=about):
         quiet, _, *_ = assess.run(track(slow_noise(0.02), log="check", role="validation"), other, arm.ARM)
         space, _, *_ = assess.run(track(effort, role="identification"), about, arm.ARM)
         alone, together = list(assess.gather([quiet])), list(assess.gather([quiet, space]))
@@ -638,6 +638,12 @@ def test_free_motion_of_a_fitted_log_raises_the_alarm_level_unless_it_is_far_fro
     assert together[0].alarm_level == space.free_max < 0.5
     [contact] = measured(track(touched, role="identification"), together, about)
     assert contact.onset.tolist() == pytest.approx([20.0], abs=0.1)
+    free = entry(role="identification", free=((0.0, 40.0),))
+    _, together, space = threshold(touched, free)
+    assert together[0].alarm_level == space.free_max > 1.9
+    assert not measured(track(touched, role="identification"), together, free)
+    said = list(assess.run(track(touched, role="identification"), free, arm.ARM))
+    assert not any(isinstance(made, Diagnostic) for made in said)
 
 
 def test_no_contact_begins_where_the_smoother_has_no_later_samples():
@@ -708,7 +714,7 @@ def test_an_effort_at_standstill_is_no_touch_however_small_efforts_are(monkeypat
 @pytest.mark.parametrize(("samples", "levels"), [(99, 0), (100, 1)])
 def test_a_level_takes_a_hundred_samples_of_free_space(samples, levels):
     free = np.arange(len(T)) < samples
-    assert len(list(assess.space_of(track(noise()), "rts", noise(), np.full(len(T), 0.1), free))) == levels
+    assert len(list(assess.space_of(track(noise()), "rts", noise(), np.full(len(T), 0.1), free, ~free))) == levels
 
 
 def test_the_offset_of_few_samples_is_as_uncertain_as_it_is_large():

@@ -30,15 +30,17 @@ def run(track: Track, entry: LogEntry, robot: Robot) -> Iterator[FreeSpace | Dia
     smoothed, filtered = (
         which(track.t, entry.possible_contact, track.rate, track.unscored) for which in (free_smoothed, free_space)
     )
-    share = 1.0 - float(np.mean(is_outside(track.t, entry.free)))
+    stated = ~is_outside(track.t, entry.free)
+    share = float(np.mean(stated))
     if entry.role == "validation" and share > MAX_SHARE_FREE:
         name, why = f"{track.log}/{track.joint}", "so levels and coverage come from the samples that gave its offset"
         message = f"{name}: `free` covers {share:.0%} of the log, {why}, and are too good; state only a part of it"
         yield diagnostic("assess", f"{track.log}.{track.joint}.free", "note", message)
-    yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
-    yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
-    if int(smoothed.sum()) >= MIN_FREE_SAMPLES:
-        yield from touch_warning(track, smoothed, entry, robot)
+    yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed, stated)
+    yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered, stated)
+    doubted = smoothed & ~stated if entry.role == "identification" else smoothed
+    if int(doubted.sum()) >= MIN_FREE_SAMPLES:
+        yield from touch_warning(track, doubted, entry, robot)
 
 
 def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -> Iterator[Diagnostic]:
@@ -66,17 +68,21 @@ def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -
         yield diagnostic("assess", f"{track.log}.{track.joint}", "warning", message)
 
 
-def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans) -> Iterator[FreeSpace]:
+def space_of(
+    track: Track, name: str, tau_ext: Array, std: Array, free: Booleans, stated: Booleans
+) -> Iterator[FreeSpace]:
     """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples.
 
     The largest effort of a log that identifies is at most twice its typical alarm level: beyond, something touched it.
+    Samples (N,) that the study has `stated` to be free count as they are.
     """
     if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     if track.role == "identification":
         typical = typical_alarm_level(tau_ext, free, track.rate)
-        statistics = statistics._replace(largest=min(statistics.largest, MAX_FITTED * typical))
+        known = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
+        statistics = statistics._replace(largest=max(min(statistics.largest, MAX_FITTED * typical), known))
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,
