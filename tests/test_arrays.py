@@ -314,15 +314,17 @@ def test_columns_that_name_no_joint_are_not_taken_for_joints_in_their_order():
     assert arrays.joints_of(arm.ARM, pd.DataFrame(np.zeros((60, 3))), None) == [j.name for j in arm.ARM.joints]
 
 
-def test_a_joint_that_is_faster_than_fitted_and_a_narrow_band_are_doubted():
-    share = PathShare(arrays.NEW, JOINT, "contact", 0.5, 1.0, 1.3, 0.0)
-    slow, other = replace(share, speed_ratio=1.1), replace(share, log="identification")
-    space = free_space(log=arrays.NEW, joint=JOINT, coverage=0.85)
+def test_motion_beyond_what_was_fitted_and_a_narrow_band_are_doubted():
+    share = PathShare("new", JOINT, "contact", 0.5, 1.0, 1.6, 0.25)
+    usual, fitted = replace(share, speed_ratio=1.4, outside=0.05), replace(share, role="identification")
+    space = free_space(log="validation", joint=JOINT, coverage=0.85)
     wide, filtered = replace(space, coverage=0.94), replace(space, filter="ekf")
-    records = {PathShare: [share, slow, other], FreeSpace: [space, wide, filtered]}
-    fast, narrow = arrays.doubts(records.__getitem__)
-    assert fast == "hand_roll moves 1.3 times as fast as in any fitted log, so its model extrapolates"
-    assert narrow.endswith("too narrow: it covers only 85 % of this log's free motion")
+    records = {PathShare: [share, usual, fitted], FreeSpace: [space, wide, filtered]}
+    assert arrays.doubts(records.__getitem__) == [
+        "new/hand_roll: it moves 1.6 times as fast as in any fitted log",
+        "new/hand_roll: 25 % of its samples are beyond all fitted positions",
+        "validation/hand_roll: the 95 % band is too narrow: it covers only 85 % of free motion",
+    ]
 
 
 def test_the_example_in_the_docstring_runs():

@@ -32,8 +32,9 @@ from davinci_forces.records import (
     Track,
     store,
 )
-from davinci_forces.records.forces import FASTER, MIN_COVERAGE, SMOOTHER
+from davinci_forces.records.forces import MIN_COVERAGE, SMOOTHER
 from davinci_forces.report.content import Number
+from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
@@ -380,7 +381,10 @@ class ExternalEffort:
 
     @property
     def contacts(self) -> pd.DataFrame:
-        """The detected contacts: joint, onset and release [s], peak, mean of the middle half, mean and impulse."""
+        """Contacts, stated or detected: onset, release [s], peak, `middle_mean` (the level if held), mean, impulse.
+
+        In a stated window in which nothing was detected, `above` is 0.
+        """
         names = [name for name in Contact.columns() if name not in ("stated", "found")]
         frames = [as_frame(contact)[["joint", *names]] for contact in self.contact_record]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["joint", *names])
@@ -430,14 +434,16 @@ def new_texts(reading: Any) -> tuple[str, ...]:
 
 
 def doubts(reading: Any) -> list[str]:
-    """What page one of a report would doubt of the new log: joints faster than fitted, bands that are too narrow."""
-    return [
-        f"{x.joint} moves {x.speed_ratio:.2g} times as fast as in any fitted log, so its model extrapolates"
-        for x in reading(PathShare) if x.log == NEW and x.speed_ratio > FASTER
-    ] + [
-        f"{x.joint}: the 95 % band is too narrow: it covers only {100 * x.coverage:.0f} % of this log's free motion"
-        for x in reading(FreeSpace) if (x.log, x.filter) == (NEW, SMOOTHER) and x.coverage < MIN_COVERAGE
-    ]  # fmt: skip
+    """What page one of a report would doubt: motion beyond the fitted one, and bands that are too narrow."""
+    texts = []
+    for x in (share for share in reading(PathShare) if share.role != FITTED):
+        if x.speed_ratio > MAX_SPEED_RATIO:
+            texts.append(f"{x.log}/{x.joint}: it moves {x.speed_ratio:.2g} times as fast as in any fitted log")
+        if x.outside > MAX_OUTSIDE:
+            texts.append(f"{x.log}/{x.joint}: {100 * x.outside:.0f} % of its samples are beyond all fitted positions")
+    spaces = [x for x in reading(FreeSpace) if x.filter == SMOOTHER and x.role != FITTED and x.coverage < MIN_COVERAGE]
+    narrow = "the 95 % band is too narrow: it covers only"
+    return texts + [f"{x.log}/{x.joint}: {narrow} {100 * x.coverage:.0f} % of free motion" for x in spaces]
 
 
 def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:

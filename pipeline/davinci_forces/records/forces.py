@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Names, Published
 
 SMOOTHER = "rts"  # the filter whose external effort is the result; the default filter is what real time would see
-FASTER = 1.2  # speed over that of all fitted logs, which may be why a band is too narrow
 MIN_COVERAGE = 0.9  # share of free-space samples that a 95 % band covers if it is not too narrow
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Diagnostic, PathShare, Prediction, Record, Spectrum, Track, Weight
-from davinci_forces.records.forces import FASTER
 from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import literal, message
@@ -23,6 +22,7 @@ LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes neg
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 MAX_NARROW = 2.4  # largest weight of a narrow band: less than that of an error for which a joint's verdict is a problem
+FASTER = 1.2  # speed over that of all fitted logs, which may be why a band is too narrow
 NEAR_TWICE = 0.1  # distance of a model error from twice the effort, from which the sign of the effort is suspected
 
 
