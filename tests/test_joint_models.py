@@ -156,6 +156,9 @@ def test_a_residual_is_bounded_and_0_where_the_joint_rests_in_every_period(ident
     assert np.abs(made.tau).max() <= 1.2 * np.abs(model.tau).max()
     elsewhere = (at < 0.44) | (at > 0.56)
     assert np.corrcoef(made.tau[elsewhere], scored.tau[elsewhere])[0, 1] > 0.999
+    last = model.t > average.t_start + (average.periods - 1) * average.period
+    once = predict.residual_of(replace(model, unscored=np.where(rests & ~last, 1, 0)), average, ("chosen", "lse"))
+    assert (np.abs(once.tau - once.tau_hat)[(at > 0.46) & (at < 0.54)] > 0.0).all()  # of one period is of use
 
 
 def test_an_identification_log_is_predicted_by_refits_that_had_not_seen_the_sample(identified):

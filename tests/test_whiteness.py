@@ -340,7 +340,7 @@ def test_a_joint_has_no_say_in_its_own_delays():
     assert_array_equal(one[0], two[0])
     assert not np.array_equal(one[1], two[1])
     [alone] = delays(list(velocities[:1]), list(first[:1]))
-    assert_array_equal(alone, np.zeros(500))
+    assert_array_equal(alone, np.zeros(500), strict=True)
 
 
 def test_an_even_clock_is_not_blamed():
