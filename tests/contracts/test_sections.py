@@ -531,6 +531,7 @@ def test_the_paragraph_for_a_paper_names_filter_and_smoother_the_data_and_each_j
         [one] = re.findall(rf"{joint.replace('_', ' ')}: (.*?)[;.] ?(?:instrument|hand|For)", text)
         assert f"({len(fit)} parameters, " in one
         assert f"low-pass of {fit.cutoff[0]:g} Hz" in one
+        assert all(name.replace(",", "") in one for name in parts.of_joint(fit, joint).values())
         for name, key in (("alarm level", f"threshold.{joint}.alarm_level"), ("coverage", f"band.{joint}.coverage")):
             assert f"{name} {full.number(key, 2)}" in one
     [weight] = full.catalogue.records(Weight)
@@ -752,6 +753,25 @@ def test_page_one_states_the_level_of_a_push_that_is_held_and_the_impulse_of_a_s
     )
     number = full.number("contact.push.hand_roll.1.impulse", 3)
     assert f" s, impulse {number})" in summary.peaks_in_words(full, [short])
+
+
+def test_page_one_claims_no_absence_on_a_joint_that_something_seems_to_touch(full: Context):
+    [contact] = full.catalogue.select(Contact, log="push", joint="hand_roll")
+    text = summary.peaks_in_words(full, [contact])
+    [absent] = re.findall(r"None on (.*)", text)
+    assert "the hand pitch above" in absent
+    touch = Diagnostic("assess", "tip.hand_pitch", np.array(["warning"], object), np.array(["x"], object))
+    about = replace(full, catalogue=Catalogue(lambda k: [touch] if k is Diagnostic else full.catalogue.records(k)))
+    assert "the hand pitch above" not in summary.peaks_in_words(about, [contact])
+
+
+def test_a_force_at_the_tip_by_the_effort_of_one_joint_is_called_unlikely(full: Context):
+    [line] = opening.forces_at_tip(full)
+    assert "alone makes unlikely" not in line
+    one = full.catalogue.select(Contact, log="tip", joint="instrument_slide")
+    about = replace(full, catalogue=Catalogue(lambda k: one if k is Contact else full.catalogue.records(k)))
+    [line] = [line for line in opening.forces_at_tip(about) if "force at the tip" in line]
+    assert ", if the arm was touched at its tip alone, which an effort on one joint alone makes unlikely" in line
 
 
 def test_the_figure_of_page_one_shows_a_contact_log_before_a_free_one_in_which_a_contact_was_found(full: Context):

@@ -9,7 +9,7 @@ from davinci_forces.records import Contact, Stiffness, Threshold, Track, Weight,
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import explanation, run_cells, section_of
+from davinci_forces.report.sections.parts import explanation, run_cells, section_of, static_frictions
 from davinci_forces.report.verdicts import is_small
 from davinci_forces.study import LogEntry
 
@@ -78,8 +78,7 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
 
 def alarm_levels(context: Context) -> str:
     """The alarm level of each joint in words, and what its static friction adds at standstill."""
-    tracks = sorted(context.catalogue.records(Track), key=lambda track: track.static_friction)
-    adds = {track.joint: f" + {context.size(track, 'static_friction')}" for track in tracks}  # the largest comes last
+    adds = {joint: f" + {level}" for joint, level in static_frictions(context).items()}
     joints = [threshold.joint for threshold in context.catalogue.records(Threshold)]
     levels = [context.number(f"threshold.{joint}.alarm_level", 3, std=None) for joint in joints]
     return ", ".join(f"{title(j).lower()} {level}{adds.get(j, '')}" for j, level in zip(joints, levels, strict=True))

@@ -139,7 +139,8 @@ def unseen_score(context: Context, joint: str) -> str:
         return ""
     efforts = context.efforts_of(fit)
     parts = [] if len(efforts) > 1 else [count(len(fit), "parameter")]
-    parts += [as_list([name for name in of_joint(fit, joint).values() if "friction" in name]) or "no friction"]
+    terms = as_list([name.replace(",", "") for name in of_joint(fit, joint).values()]) or "no term"
+    parts += [f"besides the effort of the links {terms}" if len(efforts) > 1 else terms]
     parts += [] if fit.periods else [f"low-pass of {fit.cutoff[efforts.index(joint)]:g} Hz"]
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
     error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"

@@ -37,6 +37,12 @@ def explanation(chapter: str, **values: object) -> str:
     return "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs).format(**values)
 
 
+def static_frictions(context: Context) -> dict[str, str]:
+    """The largest static friction of each joint that is tracked."""
+    tracks = sorted(context.catalogue.records(Track), key=lambda track: track.static_friction)
+    return {track.joint: context.size(track, "static_friction") for track in tracks}  # the largest comes last
+
+
 def section_of(
     heading: str, anchor: str, *kinds: type[Record]
 ) -> Callable[[Callable[..., Iterator[Block]]], Callable[[Context], Section | None]]:

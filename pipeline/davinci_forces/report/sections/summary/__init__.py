@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from davinci_forces.maths.arrays import Booleans
-from davinci_forces.records import Contact, Stiffness, Threshold, Track
+from davinci_forces.records import Contact, Diagnostic, Stiffness, Threshold, Track
 from davinci_forces.records.record import as_list
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal, message
@@ -40,14 +40,15 @@ def section(context: Context) -> Iterator[Block]:
     trusts = [parts.trust(context, joint) for joint in fitted_joints(context)]
     if trusts:
         yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
-    if lines := opening.measurements(context):
+    contacts, lines = context.catalogue.records(Contact), opening.measurements(context)
+    if trusts:
+        yield Prose(opening_paragraph(context, contacts))
+    if lines:
         yield Bullets(lines)
     if not trusts:
         yield from opening.nothing_identified(context)
         yield opening.sign_off(context)
         return
-    contacts = context.catalogue.records(Contact)
-    yield Prose(opening_paragraph(context, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
         # What is left on page one beside the table and lines of results.
@@ -172,10 +173,13 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     ]
     text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
     sought = {track.joint for track in context.catalogue.select(Track, role="contact")}
+    # A joint that something seems to touch in free motion has a level that this touch may have raised.
+    of_levels = context.catalogue.select(Diagnostic, stage="assess")
+    doubted = {d.subject.rpartition(".")[2] for d in of_levels if "warning" in d.severity.tolist()}
     levels = [
         f"{name_in_sentence(t.joint)} above {context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)}"
         for t in context.catalogue.records(Threshold)
-        if t.joint in sought - touched
+        if t.joint in sought - touched - doubted
     ]
     return f"{text} None on {as_list(levels)}." if peaks and levels else text
 
@@ -187,14 +191,14 @@ def is_doubtful(context: Context, contact: Contact) -> Booleans:
 
 
 def level_or_impulse(context: Context, contact: Contact, row: int) -> str:
-    """The impulse of a push whose middle half is shorter than the smoother's rise; the level of one that is held."""
+    """The level of a push that is held, longer than twice the smoother's rise and near its peak; else the impulse."""
     key = f"contact.{contact.log}.{contact.joint}.{row + 1}"
     rises = [track.smooth_rise for track in context.catalogue.select(Track, log=contact.log, joint=contact.joint)]
-    if contact.duration[row] < 2.0 * max(rises, default=0.0):
-        return f", impulse {context.number(f'{key}.impulse', 3)}"
+    is_long = contact.duration[row] >= 2.0 * max(rises, default=0.0)
     peak, middle = abs(contact.peak[row]), contact.middle_mean[row] * np.sign(contact.peak[row])
     is_held = middle > min(HELD * peak, max(peak - contact.peak_std[row], MIN_HELD * peak))
-    return f", held at {context.number(f'{key}.middle_mean', 3)}" if is_held else ""
+    words, name = ("held at", "middle_mean") if is_held and is_long else ("impulse", "impulse")
+    return f", {words} {context.number(f'{key}.{name}', 3)}"
 
 
 def efforts_in_words(context: Context) -> str:
@@ -227,7 +231,8 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log and c.found.any()]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
-        yield Panel(heading, "time [s]", effort, (*stated, *still, *level, line, *peaks))
+        whole = 0.0, float(track.t[-1])  # so that the times of joints stand below each other
+        yield Panel(heading, "time [s]", effort, (*stated, *still, *level, line, *peaks), x_range=whole)
 
 
 def in_column(panels: list[Panel]) -> Iterator[Panel]:
@@ -266,7 +271,9 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level",
         "Alarm level", *sought, "Coverage",
     )  # fmt: skip
-    caption = parts.explanation("trust")
+    friction = parts.static_frictions(context)
+    shown = [friction[trusted.joint] for trusted in trusts if trusted.joint in friction]
+    caption = parts.explanation("trust", friction=as_list(shown) or "its level")
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
     return Table(caption, header, rows, "trust-table", "ll" + "r" * (len(header) - 2))
 

@@ -6,7 +6,7 @@ from hashlib import sha256
 import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
-from davinci_forces.records import HandLimit, Stiffness, TipContact, TipForce, Weight
+from davinci_forces.records import Contact, HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Level, Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
@@ -99,10 +99,15 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
-        when = f"{contact.onset[row]:.1f} to {contact.release[row]:.1f} s"
+        start, end = float(contact.onset[row]), float(contact.release[row])
+        touched = [
+            of for of in context.catalogue.select(Contact, log=contact.log)
+            if (of.above.astype(bool) & (of.onset < end) & (of.release > start)).any()
+        ]  # fmt: skip
+        alone = ", which an effort on one joint alone makes unlikely" * (len(touched) == 1)
         yield (
-            f"**{literal(contact.log)}**: force at the tip up to {largest} ({when}), if the arm was touched at its tip "
-            f"alone{beside}"
+            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s), "
+            f"if the arm was touched at its tip alone{alone}{beside}"
         )
     robot = context.study.robot
     if robot.chain is not None and not context.catalogue.records(TipForce):
