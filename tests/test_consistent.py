@@ -279,7 +279,7 @@ def test_the_arm_has_a_fit_of_its_own_by_this_estimator(chosen):
 
 def test_what_it_costs_the_arm_is_said_joint_by_joint(chosen):
     said = [text for r in chosen if isinstance(r, Diagnostic) for text in r.text]
-    (text,) = [text for text in said if text.startswith("arm: no mechanism has the parameters of coupled.ridge")]
+    (text,) = [text for text in said if text.startswith("arm: no mechanism has the parameters of the fit coupled.r")]
     for joint in ROBOT.joints[:3]:
         assert re.search(rf"[\d.]+ N( m)? of {joint.name} \([+-][\d.e+-]+ %\)", text)
 

@@ -238,8 +238,8 @@ def consistent_fits(
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
             costs = ", ".join(f"{x:.3g} {unit} of {j} ({100 * (x / y - 1):+.2g} %)" for j, x, y, unit in errors)
-            message = f"{model.group}: no mechanism has the parameters of {name}"
-            follows = f"with those of consistent, which one can have, the error where fitted is {costs}"
+            message = f"{model.group}: no mechanism has the parameters of the fit {name}"
+            follows = f"to simulate, use {candidate.variant}.consistent, whose error where fitted is {costs}"
             yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 
