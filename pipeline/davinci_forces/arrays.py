@@ -32,9 +32,9 @@ from davinci_forces.records import (
     Track,
     store,
 )
-from davinci_forces.records.forces import MIN_COVERAGE, SMOOTHER
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
-from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO
+from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO, band, percent
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
@@ -97,8 +97,8 @@ def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[st
     labels = [label for label in getattr(q, "columns", ()) if isinstance(label, str)]
     width = 1 if np.ndim(q) == 1 else np.shape(q)[1] if np.ndim(q) == 2 else 0
     if joints is None and not set(labels) <= set(names):
-        known = f"q has the columns {', '.join(labels)}, but the joints of {robot.name} are {', '.join(names)}"
-        raise BadRequest(f"{known}; rename the columns, or say with joints=[...] which joint each of them is")
+        mismatch = f"q has the columns {', '.join(labels)}, but the joints of {robot.name} are {', '.join(names)}"
+        raise BadRequest(f"{mismatch}; rename the columns, or say with joints=[...] which joint each of them is")
     chosen = list(joints) if joints is not None else labels or names
     if len(chosen) != width:
         count = f"q has shape {np.shape(q)}, but there are {len(chosen)} joints: {', '.join(chosen)}"
@@ -109,14 +109,14 @@ def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[st
 def windows_of(name: str, windows: Windows, t: Array) -> list[list[float]]:
     """Windows [[start, end], ...] [s] as Python's numbers; raises BadRequest where they are none, or not of the log."""
     try:
-        found = [[float(start), float(end)] for start, end in windows]
+        spans = [[float(start), float(end)] for start, end in windows]
     except (TypeError, ValueError) as error:
         raise BadRequest(f"{name} is {windows!r}; give [[start, end], ...] in s from the first sample") from error
     length = float(t[-1] - t[0])
-    for window in found:
+    for window in spans:
         if window[0] > length:
             raise BadRequest(f"{name} {window} begins after the log, of {length:.6g} s; count from its first sample")
-    return found
+    return spans
 
 
 def columns_of(
@@ -237,12 +237,13 @@ class IdentifiedArm:
             If the arrays or windows are wrong, or no joint has a model.
         """
         columns = self._columns(t, q=q, tau=tau, dq=dq)
-        given = {"free": free, "contact": contact}
-        windows = {name: windows_of(name, of, columns["time"]) for name, of in given.items() if len(of)}
+        stated = {"free": free, "contact": contact}
+        windows = {name: windows_of(name, of, columns["time"]) for name, of in stated.items() if len(of)}
         reading = self._run(MEASURED, self._contact_log(NEW, columns, windows))
         tracks, contacts = ([r for r in reading(kind) if r.log == NEW] for kind in (Track, Contact))
-        texts = (*new_texts(reading), *doubts(reading))
-        for text in doubts(reading):
+        doubted = doubts(reading)
+        texts = (*new_texts(reading), *doubted)
+        for text in doubted:
             warnings.warn(text, stacklevel=2)
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
@@ -393,8 +394,8 @@ class ExternalEffort:
         """Plot the external effort with its 95 % band and the contacts; returns the axes, one a joint."""
         axes = axes_of({t.joint: f"external {label}" for t, label in zip(self.record, self.labels, strict=True)})
         for ax, track in zip(axes, self.record, strict=True):
-            band = 1.96 * track.tau_ext_smooth_std
-            ax.fill_between(track.t, track.tau_ext_smooth - band, track.tau_ext_smooth + band, color="C0", alpha=0.25)
+            half = 1.96 * track.tau_ext_smooth_std
+            ax.fill_between(track.t, track.tau_ext_smooth - half, track.tau_ext_smooth + half, color="C0", alpha=0.25)
             ax.plot(track.t, track.tau_ext_smooth, "C0", lw=1)
             for contact in self.contacts[self.contacts["joint"] == track.joint].itertuples():
                 ax.axvspan(contact.onset, contact.release, color="C1", alpha=0.2)
@@ -440,10 +441,13 @@ def doubts(reading: Any) -> list[str]:
         if x.speed_ratio > MAX_SPEED_RATIO:
             texts.append(f"{x.log}/{x.joint}: it moves {x.speed_ratio:.2g} times as fast as in any fitted log")
         if x.outside > MAX_OUTSIDE:
-            texts.append(f"{x.log}/{x.joint}: {100 * x.outside:.0f} % of its samples are beyond all fitted positions")
-    spaces = [x for x in reading(FreeSpace) if x.filter == SMOOTHER and x.role != FITTED and x.coverage < MIN_COVERAGE]
+            texts.append(f"{x.log}/{x.joint}: {percent(x.outside)} of its samples are beyond all fitted positions")
+    spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
-    return texts + [f"{x.log}/{x.joint}: {narrow} {100 * x.coverage:.0f} % of free motion" for x in spaces]
+    return texts + [
+        f"{x.log}/{x.joint}: {narrow} {percent(x.coverage)} of free motion"
+        for x in spaces if band(x.coverage) == "bad"
+    ]  # fmt: skip
 
 
 def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:

@@ -37,10 +37,10 @@ def explanation(chapter: str, **values: object) -> str:
     return "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs).format(**values)
 
 
-def static_frictions(context: Context) -> dict[str, str]:
+def static_frictions(context: Context, tracks: Iterable[Track]) -> dict[str, str]:
     """The largest static friction of each joint that is tracked."""
-    tracks = sorted(context.catalogue.records(Track), key=lambda track: track.static_friction)
-    return {track.joint: context.size(track, "static_friction") for track in tracks}  # the largest comes last
+    in_order = sorted(tracks, key=lambda track: track.static_friction)  # the largest comes last
+    return {track.joint: context.size(track, "static_friction") for track in in_order}
 
 
 def section_of(

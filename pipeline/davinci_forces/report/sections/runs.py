@@ -34,9 +34,8 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     tested *= bool(context.catalogue.records(Explanation))
     yield Prose(parts.explanation("runs", tuned=tuned, tested=tested))
     if at_rest := [t for t in tracks if t.at_rest]:
-        largest = {t.joint: t for t in sorted(at_rest, key=lambda t: t.static_friction)}
-        joints = context.joints_of(at_rest)
-        levels = [f"{context.size(largest[j], 'static_friction')} on {name_in_sentence(j)}" for j in joints]
+        friction = parts.static_frictions(context, at_rest)
+        levels = [f"{friction[joint]} on {name_in_sentence(joint)}" for joint in context.joints_of(at_rest)]
         yield Prose(parts.explanation("runs-at-rest", levels=as_list(levels)))
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]

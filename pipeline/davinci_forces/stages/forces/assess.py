@@ -81,8 +81,8 @@ def space_of(
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     if track.role == "identification":
         typical = typical_alarm_level(tau_ext, free, track.rate)
-        known = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
-        statistics = statistics._replace(largest=max(min(statistics.largest, MAX_FITTED * typical), known))
+        largest_stated = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
+        statistics = statistics._replace(largest=max(min(statistics.largest, MAX_FITTED * typical), largest_stated))
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,

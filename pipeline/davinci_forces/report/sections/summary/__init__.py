@@ -271,7 +271,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level",
         "Alarm level", *sought, "Coverage",
     )  # fmt: skip
-    friction = parts.static_frictions(context)
+    friction = parts.static_frictions(context, context.catalogue.records(Track))
     shown = [friction[trusted.joint] for trusted in trusts if trusted.joint in friction]
     caption = parts.explanation("trust", friction=as_list(shown) or "its level")
     rows = tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts)
