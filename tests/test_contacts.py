@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from davinci_forces.maths.contact import detection
 from davinci_forces.maths.contact.detection import (
     FALSE_ALARMS,
     Event,
@@ -14,7 +15,7 @@ from davinci_forces.maths.contact.detection import (
     events,
     free_motion_statistics,
     mean_size,
-    summarise,
+    narrower_means,
 )
 from davinci_forces.maths.periods.shift import likeness, most_different
 from davinci_forces.maths.signals.smoothing import lowpass, lowpass_segments, noise_std, share_passed
@@ -124,6 +125,11 @@ def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_o
     assert np.isnan(error_of_quantile(x[:1], 0.5))
 
 
+def summarise(t, effort, window, free, rise, constant=None):
+    """The summary of a window, where free motion tells what noise adds to narrower means."""
+    return detection.summarise(t, effort, window, free, rise, narrower_means(t, effort[2], free, rise), constant)
+
+
 def test_a_triangle_has_its_peak_mean_and_impulse():
     push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
     free = free_space(T, [(9.0, 11.0)], RATE)
@@ -159,17 +165,33 @@ def test_the_mean_of_unevenly_spaced_samples_is_over_time():
     assert late.mean == pytest.approx(0.975, abs=0.005)
 
 
-def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
-    """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
+def rounded_triangle(std=0.0):
+    """A triangle of slope 3 under two-sided exponential weights with a rise of .2 s, which take .3; and as measured."""
     weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)
-    smooth = np.convolve(3.0 * np.clip(1 - np.abs(T - 10.0), 0, None), weights / weights.sum(), "same")
+    push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
+    return np.convolve(push, weights / weights.sum(), "same"), push + noise(std=std)
+
+
+def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
+    """Noise as large as this allows no narrower mean: half of the tip, with half of it as its error."""
+    smooth, direct = rounded_triangle(std=5.0)
     found = summarise(
-        T, (smooth, np.full(len(T), 0.01), smooth), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2
+        T, (smooth, np.full(len(T), 0.01), direct), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2
     )
     assert 3.0 - found.largest == pytest.approx(0.3, rel=0.05)
     assert found.peak - found.largest == pytest.approx(0.15, rel=0.1)
     assert found.peak_std == pytest.approx(3.0 - found.peak, rel=0.1)
     assert found.t_peak == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("std", "error"), [(0.0, 0.05), (0.05, 0.15)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_peak_is_that_of_the_measured_effort_as_far_as_its_noise_allows(sign, std, error):
+    smooth, direct = rounded_triangle(std)
+    effort = (sign * smooth, np.full(len(T), 0.01), sign * direct)
+    found = summarise(T, effort, (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2)
+    assert found.peak_std < error
+    assert abs(found.peak - sign * 3.0) < 1.5 * found.peak_std
 
 
 def test_a_bias_in_free_space_makes_means_uncertain_however_long_they_are():

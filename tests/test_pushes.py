@@ -8,7 +8,7 @@ import pytest
 from davinci_forces.filters import tracker
 from davinci_forces.filters.problem import NoiseModel, joint_at_rest
 from davinci_forces.filters.response import rise, rounding_error, smallest_q_tau
-from davinci_forces.maths.contact.detection import events
+from davinci_forces.maths.contact.detection import events, narrower_means, summarise
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 
 T_S, INERTIA, VISCOUS, START = 0.01, 0.3, 0.3, 10.0
@@ -21,6 +21,8 @@ SHAPES = {  # of the share of its duration that has passed
     "half-sine": lambda x: np.sin(np.pi * x),
     "squared sine": lambda x: np.sin(np.pi * x) ** 2,
     "ramp and hold": lambda x: np.minimum(np.minimum(x / 0.4, (1.0 - x) / 0.2), 1.0),
+    "sawtooth": lambda x: np.minimum(x / 0.15, (1.0 - x) / 0.85),
+    "let go in two steps": lambda x: np.interp(x, [0.0, 0.2, 0.5, 0.6, 0.85, 1.0], [0.0, 1.0, 1.0, 0.55, 0.6, 0.0]),
 }
 PUSHES = [("step", 4.0), ("step", 0.5), ("triangle", 2.0), ("triangle", 0.6), ("half-sine", 1.0), ("half-sine", 0.3)]
 PUSHES += [("squared sine", 1.0), ("squared sine", 0.5), ("ramp and hold", 4.0)]
@@ -94,6 +96,32 @@ def test_times_of_contact_have_the_errors_that_are_stated():
     assert len(z) > 200
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.2
     assert np.mean(np.abs(z) < NORMAL_95) > 0.9
+
+
+def test_a_push_that_ends_in_two_steps_is_released_where_the_last_ends():
+    """The ramp of its flanks at 1/4 and 3/4 of the peak would end 2 s after the push."""
+    for seed in range(4):
+        _, effort, std, _, spread = smoothed("let go in two steps", 6.0, 3.0, seed)
+        [found] = [e for e in events(T, effort, std, 4.0 * std.mean(), spread) if abs(e.onset - START) < 1.0]
+        assert abs(found.release - START - 6.0) < 2.5 * found.release_std < 1.0
+
+
+@pytest.mark.parametrize("peak", [1.0, 3.0])
+def test_a_peak_is_as_sure_as_stated_whatever_the_push_is_like(peak):
+    """Half of the tip that smoothing takes off, with as much as its error, was off by up to a third, and 2.2 errors."""
+    z, size = [], []
+    for shape, duration in [*PUSHES, ("triangle", 0.3), ("triangle", 0.2), ("sawtooth", 1.0), ("sawtooth", 0.4)]:
+        for seed in range(4):
+            true, effort, std, _, spread = smoothed(shape, duration, peak, seed)
+            direct = true + 0.14 * np.random.default_rng(seed).normal(size=len(T))  # the drive's noise in `smoothed`
+            window, free = (START - 0.05, START + duration + 0.05), np.abs(T - START - 0.5 * duration) > duration + 1.0
+            means = narrower_means(T, direct, free, spread)
+            found = summarise(T, (effort, std, direct), window, free, spread, means)
+            z.append((found.peak - peak) / found.peak_std)
+            size.append(found.peak_std / peak)
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.2
+    assert np.mean(np.abs(z) < NORMAL_95) > 0.9
+    assert np.mean(size) < 0.12 * (1.0 if peak < 2.0 else 0.5)
 
 
 @pytest.mark.parametrize("rise_of", FLANKS.values(), ids=FLANKS)

@@ -43,12 +43,13 @@ def path(robot: str, slide: float | None = None) -> np.ndarray:
 
 
 def tracks(robot: str, tau, q=None, log="push", role="contact", at_rest=(0, 0, 0)) -> list[Track]:
-    """Tracks of three joints with these efforts (N, 3), whose deviations are STD."""
+    """Tracks of three joints with these efforts (N, 3), whose deviations are STD; no sample tells them by itself."""
     q, zero = path(robot) if q is None else q, np.zeros(len(T))
-    made = []
+    made, noisy = [], np.random.default_rng(9).normal(size=len(T))
     for i, name in enumerate(NAMES):
         columns = dict.fromkeys(Track.columns(), zero) | {
-            "t": T, "q": q[:, i], "tau_ext_smooth": tau[:, i], "tau_ext_smooth_std": zero + STD[i]
+            "t": T, "q": q[:, i], "tau_ext_smooth": tau[:, i], "tau_ext_smooth_std": zero + STD[i],
+            "tau_ext_direct": tau[:, i] + 100.0 * STD[i] * noisy,
         }  # fmt: skip
         scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest[i], "rate": RATE, "filter": "ekf"}
         parts = {"smooth_part": 0.6 * STD[i], "model_part": 0.8 * STD[i]}

@@ -229,7 +229,7 @@ class OnlineJoint:
         self.alarm, self.static = tuned["alarm_level"], tuned["static_friction"]
         self.follow = min(self.T_s / max(tuned.get("lag", 0.0), self.T_s), 1.0)  # of an effort late by as much again
         own = range(4, 6) if self.coupled else range(6)  # coefficients that the filter computes at its own state
-        self.c = tuple(sum(t.value * t.c[i] for t in self.terms) if i in own else 0.0 for i in range(7))
+        self.c = tuple(sum(t.value * t.c[i] for t in self.terms) if i in own else 0.0 for i in range(len(FUNCTIONS)))
         self.restart()
 
     def restart(self) -> None:

@@ -206,7 +206,7 @@ class Contact(LogJointRecord):
     duration: Column
     duration_std: Column
     t_peak: Column
-    peak: Column  # with half of what the smoother takes off the tip of a triangle
+    peak: Column  # with what the smoother takes off the tip of a push
     peak_std: Column
     middle_mean: Column
     middle_mean_std: Column

@@ -11,6 +11,7 @@ T_s long:
     onset = t(half the peak) - .7 T,    T^2 = T_seen^2 - (2 ln(2) T_s)^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
 A smoothed step has T = 0: it approaches both of its levels exponentially, with its steepest slope 1 / T_s in between.
+A push that rises to 1/2 of its peak in less than half of the time that a ramp takes has T_seen = 4 (t(1/2) - t(1/4)).
 The peak of these shares is the median of what exceeds 3/4 of the largest sample, which noise raises; a ramp begins at
 the same time by either.  A push that rises like a squared sine begins .25 T before such a ramp, and one of least jerk,
 as of a hand, .4 T.  Real pushes lie between ramp and hand: onsets are put in the middle, .2 T from either, and the
@@ -20,13 +21,18 @@ is the root of a small difference.
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
-The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off the tip of a
-triangle is taken as the peak minus the mean over `TIP_REACH` on either side.  A triangle loses all of it and a plateau
-nothing, so half of it is added to the peak, and half to its standard error.  Mean and impulse are those of the measured
-minus the modelled effort, because a smoother spreads a part of a push out of its window.  Student's t widens their
-errors if free motion holds few windows.
+A smoother rounds off the tip of a push.  Its peak is therefore the largest mean of the measured minus the modelled
+effort near the largest smoothed sample.  Of several times that the mean may take, that of the smallest error counts, or
+else the smoothed effort.  The error contains the largest of such means in free motion, the standard deviation of the
+effort, and the shape of the push.  A mean takes off a triangle what a mean of twice the length takes off again, and
+nothing off a plateau: half of that is added to the peak, and half to its error.  For the smoothed effort it is the peak
+minus the mean over `TIP_REACH` on either side.  What shorter means say against a longer one, beyond their noise, counts
+as its error, too.
+Mean and impulse are those of the measured minus the modelled effort, too, because a smoother spreads a part of a push
+out of its window.  Student's t widens their errors if free motion holds few windows.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +42,7 @@ from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
-HALF = 0.5  # of what is rounded off a triangle, which a peak loses on average, with an error as large
+NARROWER = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of `TIP_REACH`: half of the time of means that may show a peak
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
 SHIFT = 0.2  # of the duration of a rise: how much earlier than a ramp a push of a typical shape begins
@@ -125,9 +131,11 @@ def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int,
     k, inside = (start if inwards > 0 else stop - 1), size[start:stop]
     peak = float(np.median(inside[inside >= 0.75 * inside.max()]))
     lower, middle, upper = (inner_crossing(t, size, k, inwards, share * peak) for share in (0.25, 0.5, 0.75))
-    apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
+    whole, outer = (2.0, abs(upper - lower)), (4.0, abs(middle - lower))  # times of a half, and of a quarter
+    times, part = whole if 2.0 * outer[1] > 0.5 * whole[1] else outer  # a push that changes is no ramp up to its peak
+    apparent = max(times * part, float(t[1] - t[0]))
     duration, crossing_std = float(np.sqrt(max(apparent**2 - (STEP_WIDTH * rise) ** 2, 0.0))), std[k] * apparent / peak
-    longer = float(np.sqrt(duration**2 + 2.0 * apparent * (2.0 * 2.0**0.5 * crossing_std)))  # of T_seen = 2 (t_b - t_a)
+    longer = float(np.sqrt(duration**2 + 2.0 * apparent * (times * 2.0**0.5 * crossing_std)))
     error = np.linalg.norm([crossing_std, SHAPE * duration, 0.5 * (longer - duration)])
     return middle - (0.5 + SHIFT) * inwards * duration, float(error)
 
@@ -147,7 +155,7 @@ def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) ->
 class Summary(NamedTuple):
     """One window of contact."""
 
-    peak: float  # the largest sample, with its sign, and half of what the smoother rounds off
+    peak: float  # the largest sample, with its sign, and what the smoother rounds off
     peak_std: float
     mean: float
     mean_std: float
@@ -164,12 +172,14 @@ def summarise(
     window: tuple[float, float],
     free: Booleans,
     rise: float,
+    means: Sequence[tuple[int, float]],
     constant_std: Array | None = None,
 ) -> Summary | None:
     """Peak, mean and impulse of an external effort in a window [s]; None if that is empty.
 
     `effort` is the smoothed one (N,), its deviation (N,), and measured minus modelled effort (N,).
-    `free` (N,) are the samples at which nothing touches the robot.  `rise` [s] is the duration T_s of a step.
+    `free` (N,) are the samples at which nothing touches the robot.  `rise` [s] is the duration T_s of a step,
+    and `means` are the `narrower_means`.
     `constant_std` (N,) is the part of the deviation that no mean reduces and that free motion does not show.
     """
     (tau_ext, std, direct), (start, end) = effort, window
@@ -179,9 +189,10 @@ def summarise(
     mean, mean_std = mean_effort(t, direct, window, free, constant_std)
     duration = end - start
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
-    noise_std = float(np.hypot(std[k], largest_size(tau_ext, free, len(inside))))
-    rounded, largest = HALF * rounded_off(t, tau_ext, k, rise), float(tau_ext[k])
-    peak = largest + rounded, float(np.hypot(noise_std, rounded))
+    noise, largest = largest_size(tau_ext, free, len(inside)), float(tau_ext[k])
+    tip = rounded_off(t, tau_ext, direct, k, rise, noise, means)
+    peak = largest + tip.lost, float(np.linalg.norm([std[k], tip.noise, tip.shape]))
+    noise_std = float(np.hypot(std[k], noise))
     return Summary(*peak, mean, mean_std, mean * duration, mean_std * duration, noise_std, largest, float(t[k]))
 
 
@@ -204,9 +215,48 @@ def mean_effort(
     return float(np.average(direct[within], weights=shares)), float(error)
 
 
-def rounded_off(t: Array, tau_ext: Array, k: int, rise: float) -> float:
-    """What a smoother that spreads a step over `rise` [s] takes off a triangle with its peak at sample k of (N,)."""
-    return float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
+class Rounding(NamedTuple):
+    """What a smoother takes off a peak, its error by the shape of the push, and by what noise adds to the peak."""
+
+    lost: float
+    shape: float  # both with the sign of the effort, unless it grows beyond its window
+    noise: float
+
+
+def narrower_means(t: Array, direct: Array, free: Booleans, rise: float) -> list[tuple[int, float]]:
+    """The samples of means of an effort (N,), and the size of their largest in free windows as long as a tip."""
+    reach = tip_samples(t, rise)
+    lengths = sorted({2 * round(share * reach) + 1 for share in NARROWER}) if reach else []
+    return [(length, largest_size(direct, free, 2 * reach + 1, length)) for length in lengths]
+
+
+def rounded_off(
+    t: Array, tau_ext: Array, direct: Array, k: int, rise: float, noise: float, means: Sequence[tuple[int, float]]
+) -> Rounding:
+    """What a smoother that spreads a step over `rise` [s] takes off the peak at sample k of an effort (N,).
+
+    `direct` (N,) is measured minus modelled effort, and `means` are its `narrower_means`; `noise` is the size of the
+    largest smoothed samples of free motion.
+    """
+    reach, peak = tip_samples(t, rise), float(tau_ext[k])
+    triangle = peak - float(tau_ext[max(k - reach, 0) : k + reach + 1].mean())
+    side, choices = float(np.sign(peak)), list[Rounding]()
+    for length, size in means:
+        near = side * direct[max(k - reach - length // 2, 0) : k + reach + length // 2 + 1]
+        top, wider = (moving_mean(near, n).max(initial=-np.inf) for n in (length, length + 2 * max(length // 2, 1)))
+        if np.isfinite(wider):
+            shape = 0.5 * float(top - wider)
+            choices.append(Rounding(side * (float(top) + shape) - peak, side * shape, size))
+    choices.append(Rounding(0.5 * triangle, 0.5 * triangle, noise))
+    for j, choice in enumerate(choices):
+        against = [abs(choice.lost - other.lost) - NORMAL_95 * other.noise for other in choices[:j]]
+        choices[j] = choice._replace(shape=float(np.copysign(np.hypot(choice.shape, max([0.0, *against])), peak)))
+    return min(choices, key=lambda choice: np.nan_to_num(np.hypot(choice.shape, choice.noise), nan=np.inf))
+
+
+def tip_samples(t: Array, rise: float) -> int:
+    """The number of samples in `TIP_REACH`, at even times (N,) [s]; 0 if the rise is unknown."""
+    return round(TIP_REACH * rise / float(t[1] - t[0])) if len(t) > 1 and np.isfinite(rise) else 0
 
 
 def without_rounding(std: Array, rounding: Array) -> Array:
@@ -214,15 +264,21 @@ def without_rounding(std: Array, rounding: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(std**2 - rounding**2, 0.0)))
 
 
+def moving_mean(x: Array, length: int) -> Array:
+    """Means (N - length + 1,) over `length` consecutive samples of (N,)."""
+    total = np.cumsum(np.concatenate([[0.0], x]))
+    return x if length == 1 else np.asarray((total[length:] - total[:-length]) / length)
+
+
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
     """Root mean square of means over `length` free samples, or over the longest run; NaN without free samples."""
-    sums = ((np.cumsum(np.concatenate([[0.0], run])), length) for run, length in _runs(tau_ext, free, length))
-    return _size([(total[length:] - total[:-length]) / length for total, length in sums])
+    return _size([moving_mean(run, length) for run, length in _runs(tau_ext, free, length)])
 
 
-def largest_size(tau_ext: Array, free: Booleans, length: int) -> float:
-    """Root mean square of the largest samples of consecutive windows of `length` samples in free space."""
-    windows = (np.array_split(run, max(len(run) // length, 1)) for run, length in _runs(tau_ext, free, length))
+def largest_size(tau_ext: Array, free: Booleans, length: int, of: int = 1) -> float:
+    """Root mean square of the largest of `length` consecutive samples in free space, or of means `of` as many."""
+    parts = [moving_mean(run, of) for run, used in _runs(tau_ext, free, length + of - 1) if used >= of]
+    windows = (np.array_split(part, max(len(part) // length, 1)) for part in parts)
     return _size([np.array([np.abs(window).max() for window in of_run]) for of_run in windows])
 
 

@@ -106,9 +106,10 @@ def contacts(
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     effort = (*steady_effort(track), track.tau_ext_direct)
+    means = detection.narrower_means(track.t, track.tau_ext_direct, free, track.smooth_rise)
     rows, short = [], []
     for window, event, stated in placed:
-        summary = detection.summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
+        summary = detection.summarise(track.t, effort, window, free, track.smooth_rise, means, friction_std)
         clear = summary is not None and abs(summary.largest) > NORMAL_95 * summary.noise_std
         event = event if clear else None
         if summary is not None and (event or (stated and not track.at_rest)):

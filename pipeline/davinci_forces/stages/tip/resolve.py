@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.contact.detection import HALF, largest_size, rounded_off, without_rounding
+from davinci_forces.maths.contact.detection import Rounding, largest_size, narrower_means, rounded_off, without_rounding
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -201,7 +201,7 @@ def tip_contacts(
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
     u = f[at] / size[at, None]
-    C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, largest_in_free_motion(tracks, onset, release))
+    C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, rounded_off_joints(tracks, at, onset, release))
     x, y, z = f_peak = (f[at] + lost).T
     sigma, axes = tip_force.sigma_ellipsoid(C)
     std = np.sqrt(np.diagonal(C, axis1=1, axis2=2))
@@ -216,35 +216,41 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def largest_in_free_motion(tracks: Sequence[Track], onset: Array, release: Array) -> Array:
-    """Root mean square (K, 3) of each joint's largest effort in free windows as long as each contact (K,)."""
+def rounded_off_joints(tracks: Sequence[Track], at: Integers, onset: Array, release: Array) -> Rounding:
+    """What is rounded off each joint's effort at peaks (K,), with its errors, each (K, 3)."""
     windows, lengths = list(zip(onset, release, strict=True)), np.round((release - onset) * tracks[0].rate).astype(int)
     free = np.all([free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks], axis=0)
-    return np.nan_to_num([[largest_size(t.tau_ext_smooth, free, max(n, 1)) for t in tracks] for n in lengths.tolist()])
+    rows = []
+    for t in tracks:
+        means = narrower_means(t.t, t.tau_ext_direct, free, t.smooth_rise)
+        for k, n in zip(at.tolist(), lengths.tolist(), strict=True):
+            largest = largest_size(t.tau_ext_smooth, free, max(n, 1))
+            rows.append(rounded_off(t.t, t.tau_ext_smooth, t.tau_ext_direct, k, t.smooth_rise, largest, means))
+    return Rounding(*np.nan_to_num(rows).reshape(len(tracks), len(at), 3).transpose(2, 1, 0))
 
 
 def peak_errors(
-    force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, u: Array, largest: Array
+    force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, u: Array, rounding: Rounding
 ) -> tuple[Array, Array, Array]:
     """Covariance (K, 3, 3) of the force at peaks (K,), errors (K, 3) of its half-axes, and what is rounded off (K, 3).
 
-    Noise raises the largest of many samples, so along its direction `u` (K, 3) the `largest` in free motion (K, 3)
-    counts, too.  Each joint's model variance has an error; what is rounded off is as uncertain as the rest of f.
+    Noise raises the largest of many samples, so along its direction `u` (K, 3) that of the `rounding` (K, 3) counts,
+    too.  Each joint's model variance has an error; the shape of a push is as uncertain as the rest of f.
     """
     J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
     std = np.stack([without_rounding(t.tau_ext_smooth_std[at], t.tau_ext_rounding[at]) for t in tracks], axis=-1)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
-    rounded = np.array([[rounded_off(t.t, t.tau_ext_smooth, k, t.smooth_rise) for t in tracks] for k in at.tolist()])
-    lost, C = tip_force.from_efforts(J, HALF * rounded, tip_force.covariance(std, rho))
+    lost, C = tip_force.from_efforts(J, rounding.lost, tip_force.covariance(std, rho))
+    shape, _ = tip_force.from_efforts(J, rounding.shape, tip_force.covariance(std, rho))
     squares, half_axes = np.zeros(std.shape), tip_force.sigma_ellipsoid(C)[0]
     for i, track in enumerate(tracks):
         wider = std.copy()
         wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
-        _, C_wider = tip_force.from_efforts(J, HALF * rounded, tip_force.covariance(wider, rho))
+        _, C_wider = tip_force.from_efforts(J, rounding.shape, tip_force.covariance(wider, rho))
         squares += (tip_force.sigma_ellipsoid(C_wider)[0] - half_axes) ** 2
-    _, C_largest = tip_force.from_efforts(J, largest, tip_force.covariance(largest, rho))
+    _, C_largest = tip_force.from_efforts(J, rounding.noise, tip_force.covariance(rounding.noise, rho))
     raised = u * np.sqrt(np.einsum("ni,nij,nj->n", u, C_largest, u))[:, None]
-    C_peak = C + sum(x[:, :, None] * x[:, None, :] for x in (lost, raised))
+    C_peak = C + sum(x[:, :, None] * x[:, None, :] for x in (shape, raised))
     sigma, axes = tip_force.sigma_ellipsoid(C_peak)
-    share = np.einsum("nki,ni->nk", axes, lost) / np.maximum(sigma, np.finfo(float).tiny)
+    share = np.einsum("nki,ni->nk", axes, shape) / np.maximum(sigma, np.finfo(float).tiny)
     return C_peak, np.sqrt(squares + share**2 * np.einsum("nki,nij,nkj->nk", axes, C, axes)), lost
