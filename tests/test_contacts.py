@@ -660,6 +660,10 @@ def test_free_motion_of_a_fitted_log_raises_the_alarm_level_unless_it_is_far_fro
     assert together[0].alarm_level == space.free_max < 0.5
     [contact] = measured(track(touched, role="identification"), together, about)
     assert contact.onset.tolist() == pytest.approx([20.0], abs=0.1)
+    again = fitted + np.where(np.abs(T - 16.0) <= 7.0, 0.6 * (np.mod(T, 6.0) < 0.3), 0.0)  # 12 and 18 s: as touches may
+    assert threshold(again)[2].free_max < 0.5
+    again = fitted + np.where(np.abs(T - 18.0) <= 7.0, 0.6 * (np.mod(T, 6.0) < 0.3), 0.0)  # and 24 s, as with a period
+    assert threshold(again)[2].free_max > 0.6
     free = entry(role="identification", free=((0.0, 40.0),))
     _, together, space = threshold(touched, free)
     assert together[0].alarm_level == space.free_max > 1.9

@@ -25,9 +25,9 @@ A smoother rounds off the tip of a push.  Its peak is therefore the largest mean
 effort near the largest smoothed sample.  Of several times that the mean may take, that of the smallest error counts, or
 else the smoothed effort.  The error contains the largest of such means in free motion, the standard deviation of the
 effort, and the shape of the push.  A mean takes off a triangle what a mean of twice the length takes off again, and
-nothing off a plateau: half of that is added to the peak, and half to its error.  For the smoothed effort it is the peak
-minus the mean over `TIP_REACH` on either side.  What shorter means say against a longer one, beyond their noise, counts
-as its error, too.
+nothing off a plateau.  Half of that is added to the peak, and half to its error.  For the smoothed effort it is the
+peak minus the mean over `TIP_REACH` on either side.  What shorter means say against a longer one, beyond their noise,
+counts as its error, too.
 Mean and impulse are those of the measured minus the modelled effort, too, because a smoother spreads a part of a push
 out of its window.  Student's t widens their errors if free motion holds few windows.
 """

@@ -8,7 +8,14 @@ from davinci_forces.filters.error_bands import joint_alarm_level
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import free_motion_statistics, typical_alarm_level
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space, is_outside
+from davinci_forces.maths.signals.windows import (
+    MIN_FREE_SAMPLES,
+    TRANSIENT,
+    free_smoothed,
+    free_space,
+    is_outside,
+    unbroken,
+)
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -16,6 +23,7 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 MAX_FITTED = 2.0  # largest effort of a fitted log over its typical alarm level, beyond which it is a touch
+MAX_TOUCHES = 2  # of a fitted log: what comes again and again is an error of the model
 MAX_SHARE_FREE = 0.5  # of a log of validation that may give its offset
 TOUCHED = 3.0  # largest effort of a log over its typical alarm level; recorded free motion stays below 1.7
 
@@ -73,16 +81,19 @@ def space_of(
 ) -> Iterator[FreeSpace]:
     """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples.
 
-    The largest effort of a log that identifies is at most twice its typical alarm level: beyond, something touched it.
+    The largest effort of a log that identifies is at most twice its typical alarm level: beyond, something touched it,
+    unless that comes more often than touches do.
     Samples (N,) that the study has `stated` to be free count as they are.
     """
     if int(free.sum()) < MIN_FREE_SAMPLES:
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     if track.role == "identification":
-        typical = typical_alarm_level(tau_ext, free, track.rate)
+        highest = MAX_FITTED * typical_alarm_level(tau_ext, free, track.rate)
+        if len(unbroken(track.t[free & (np.abs(tau_ext) > highest)], TRANSIENT)) > MAX_TOUCHES:
+            highest = statistics.largest
         largest_stated = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
-        statistics = statistics._replace(largest=max(min(statistics.largest, MAX_FITTED * typical), largest_stated))
+        statistics = statistics._replace(largest=max(min(statistics.largest, highest), largest_stated))
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,
