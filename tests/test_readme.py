@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -55,6 +56,7 @@ from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import AttachedMass, HapticScenario, LogEntry, Options, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES, TARE_ROLES
+from tests import test_tip
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "pipeline" / "davinci_forces"
@@ -531,6 +533,20 @@ def test_the_lines_of_python_of_the_readme_and_of_streams_run(analysed, tmp_path
         for code in re.findall(r"```python\n(.*?)```", text, re.S):
             exec(code.replace("raw/davinci-demo", str(tmp_path / "lab" / "raw" / "arm")), {})
     assert "starting" in capsys.readouterr().out
+
+
+def test_the_lines_on_the_force_at_the_tip_give_the_force_that_the_report_gives(monkeypatch, capsys):
+    efforts = test_tip.efforts("davinci", test_tip.PUSH) + test_tip.noise(3)
+    tracks = test_tip.tracks("davinci", efforts)
+    rows = [{name: getattr(t, name) for name in ("t", "q", "tau_ext_smooth", "tau_ext_smooth_std")} for t in tracks]
+    every = pd.concat([pd.DataFrame(row | {"joint": t.joint}) for row, t in zip(rows, tracks, strict=True)])
+    monkeypatch.setattr(davinci_forces, "read", lambda *_, **__: every)
+    made: dict = {}
+    exec(PAGES["tip-force"].partition("```python\n")[2].partition("```")[0], made)
+    force = test_tip.run("davinci", tracks)[TipForce]
+    np.testing.assert_allclose(made["force"], np.column_stack([force.f_x, force.f_y, force.f_z]), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(made["C"][:, 0, 1], force.c_xy, rtol=1e-6)
+    assert "left in the efforts: 0.0" in capsys.readouterr().out
 
 
 def test_estimators_are_those_that_there_are():

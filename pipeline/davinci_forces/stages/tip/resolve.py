@@ -86,7 +86,7 @@ def why_unknown(tracks: dict[str, Track], robot: Robot, chain: Chain) -> str:
     """State why the force at the tip is not known in a log; "" if it is."""
     if len(robot.joints) > TIP_JOINTS:  # the chain would assume that the joints beyond stand still
         moment = f"the efforts of more than {TIP_JOINTS} also hold a moment"
-        remedy = "make joints that stand still `fixed` in its URDF, or use the external efforts of the joints"
+        remedy = "make joints that stand still `fixed` in its URDF, or see `davinci-forces guide tip-force`"
         return f"{robot.name} has {len(robot.joints)} joints, and {moment}; {remedy}"
     names = [joint.name for joint in robot.joints]
     missing = [
