@@ -20,7 +20,7 @@ ADVICE = {
     "velocity": "Worth trying: friction with another shape, or coupling to other joints.",
     "reversals": "Worth trying: presliding friction (a dahl element).",
 }
-ALL_TRIED = "No term that was tried for the choice of the model removes this."
+ALL_TRIED = "No other term that the search for the model tried lowers the error of what it leaves out clearly."
 
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
