@@ -124,6 +124,25 @@ def test_the_deviation_of_a_peak_holds_what_the_smoother_rounds_off_it():
     assert smooth[TipContact].f_z_std[0] > exact[TipContact].f_z_std[0]
 
 
+def test_the_largest_force_is_that_of_the_measured_efforts_at_its_time_where_these_are_sure():
+    """The triangle again, and an effort of the roll alone that goes on beyond the peak: it counts as it is there."""
+    rise = 0.2  # [s]
+    weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE * 2 / rise)
+    rounded = efforts("davinci", np.column_stack([np.convolve(x, weights / weights.sum(), "same") for x in PUSH.T]))
+    drift = np.clip(T - 9.5, 0.0, 1.5)[:, None] * [1.0, 0.0, 0.0]
+    measured = efforts("davinci", PUSH) + drift
+    few = 0.02 * STD * np.random.default_rng(2).normal(size=measured.shape)
+    noisy = [replace(track, smooth_rise=rise) for track in tracks("davinci", rounded + drift)]
+    sure = [replace(track, tau_ext_direct=(measured + few)[:, i]) for i, track in enumerate(noisy)]
+    before, after = (run("davinci", of, contact=((9.5, 10.2),))[TipContact] for of in (noisy, sure))
+    k = int(np.argmin(np.abs(T - after.t_peak[0])))
+    J, _ = kinematics.jacobian(load("davinci", Path()).chain, path("davinci")[k])
+    f, said = np.linalg.solve(J.T, measured[k]), [after.f_x[0], after.f_y[0], after.f_z[0]]
+    np.testing.assert_allclose(said, f, atol=0.02 * np.linalg.norm(f))
+    assert before.f_peak[0] < 0.98 * np.linalg.norm(f)
+    assert after.f_peak_std[0] < before.f_peak_std[0]
+
+
 def test_the_error_of_the_largest_force_of_a_push_that_is_held_holds_what_noise_adds_to_it():
     """Noise of which each second has one value raises the largest of a push of 4 s; the mean would be right."""
     windows = tuple((float(start), start + 4.0) for start in range(2, 36, 7))

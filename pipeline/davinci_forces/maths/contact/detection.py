@@ -231,19 +231,22 @@ def narrower_means(t: Array, direct: Array, free: Booleans, rise: float) -> list
 
 
 def rounded_off(
-    t: Array, tau_ext: Array, direct: Array, k: int, rise: float, noise: float, means: Sequence[tuple[int, float]]
-) -> Rounding:
+    t: Array, tau_ext: Array, direct: Array, k: int, rise: float, noise: float, means: Sequence[tuple[int, float]],
+    moves: bool = True,
+) -> Rounding:  # fmt: skip
     """What a smoother that spreads a step over `rise` [s] takes off the peak at sample k of an effort (N,).
 
     `direct` (N,) is measured minus modelled effort, and `means` are its `narrower_means`; `noise` is the size of the
-    largest smoothed samples of free motion.
+    largest smoothed samples of free motion.  Smoothing may have moved the peak, unless it is that of other joints.
     """
     reach, peak = tip_samples(t, rise), float(tau_ext[k])
     triangle = peak - float(tau_ext[max(k - reach, 0) : k + reach + 1].mean())
-    side, choices = float(np.sign(peak)), list[Rounding]()
+    side, by, choices = float(np.sign(peak)), reach if moves else 0, list[Rounding]()
     for length, size in means:
-        near = side * direct[max(k - reach - length // 2, 0) : k + reach + length // 2 + 1]
-        top, wider = (moving_mean(near, n).max(initial=-np.inf) for n in (length, length + 2 * max(length // 2, 1)))
+        top, wider = (
+            moving_mean(side * direct[max(k - by - half, 0) : k + by + half + 1], 2 * half + 1).max(initial=-np.inf)
+            for half in (length // 2, 2 * (length // 2) or 1)
+        )
         if np.isfinite(wider):
             shape = 0.5 * float(top - wider)
             choices.append(Rounding(side * (float(top) + shape) - peak, side * shape, size))

@@ -225,7 +225,8 @@ def rounded_off_joints(tracks: Sequence[Track], at: Integers, onset: Array, rele
         means = narrower_means(t.t, t.tau_ext_direct, free, t.smooth_rise)
         for k, n in zip(at.tolist(), lengths.tolist(), strict=True):
             largest = largest_size(t.tau_ext_smooth, free, max(n, 1))
-            rows.append(rounded_off(t.t, t.tau_ext_smooth, t.tau_ext_direct, k, t.smooth_rise, largest, means))
+            of = (t.t, t.tau_ext_smooth, t.tau_ext_direct, k, t.smooth_rise)
+            rows.append(rounded_off(*of, largest, means, moves=False))
     return Rounding(*np.nan_to_num(rows).reshape(len(tracks), len(at), 3).transpose(2, 1, 0))
 
 
