@@ -6,10 +6,12 @@ import errno
 import gc
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
 import sys
+import tomllib
 import weakref
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -21,6 +23,7 @@ import pytest
 from davinci_forces.errors import BadLog, BadRequest
 from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
 from davinci_forces.robots import davinci
+from davinci_forces.robots.robot import Limits
 from davinci_forces.runner import execution
 from davinci_forces.runner.fingerprint import PACKAGE, Fingerprint, canonical, code, find_imports, hash_of
 from davinci_forces.runner.ledger import Folders
@@ -609,7 +612,37 @@ def test_positions_beyond_the_limits_are_noted_beyond_twice_warned_of_and_beyond
 def test_no_zero_of_positions_is_offered_against_velocities_beyond_the_limits():
     remark = remarked(lambda c: c.update(dq=2.5 * c["dq"]))
     assert "velocities from" in remark
-    assert "to 1.2; correct the units, or the `rate`, or `limits` in [robot_overrides], by which" in remark
+    assert (
+        "to 1.2; correct the units, or the `rate`, or the limits, by which `excite` designs, if these are wrong"
+        in remark
+    )
+    assert "tip" not in remark
+
+
+@pytest.mark.parametrize(
+    ("joint", "depends"), [("hand_roll", "gravity and the arm's pose"), ("instrument_slide", "pose")]
+)
+def test_limits_that_hold_the_motion_are_printed_to_be_pasted_and_nothing_is_said_of_forces_at_the_tip(joint, depends):
+    signal, known = arm.signal(joint, rate=100.0, periods=2), arm.joint(joint)
+    beyond = 0.1 * np.ptp(signal.q)
+    tight = replace(known.limits, q=(signal.q.min() + beyond, signal.q.max() - beyond), effort=12.5)
+    columns = {"t": signal.t, "q": signal.q, "dq": signal.dq, "tau": signal.tau, "filled": np.zeros(len(signal.t), int)}
+    recording = Recording("run", joint, "identification", 100.0, "logged", **columns)
+
+    def said(limits: Limits) -> list[str]:
+        made = resample.run(recording, replace(known, limits=limits), lowpass=17.0)
+        return [text for record in made if isinstance(record, Diagnostic) for text in record.text if "states" in text]
+
+    [text] = said(tight)
+    line = re.search(r"`(limits = .*?)` in \[robot_overrides\.(\w+)\] of study.toml", text)
+    assert line is not None
+    assert (line[2], depends in text, "forces at the tip" in text) == (joint, True, False)
+    stated = tomllib.loads(line[1])["limits"]
+    assert (stated["dq"], stated["ddq"], stated["effort"]) == ([*tight.dq], [*tight.ddq], 12.5)
+    low, high = np.percentile(signal.q, (1.0, 99.0))
+    assert stated["q"][0] <= low < high <= stated["q"][1]
+    assert max(len(f"{x:.6g}".lstrip("-0.")) for x in stated["q"]) <= 3
+    assert said(replace(tight, q=tuple(stated["q"]))) == []
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from davinci_forces.maths.signals.clock import are_gaps, are_missing, longest_br
 from davinci_forces.maths.signals.faults import count_saturated, find_stuck
 from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
 from davinci_forces.records import Column, Counts, Diagnostic, Motion, Recording, Signal, diagnostic
-from davinci_forces.robots.robot import Joint, Kind
+from davinci_forces.robots.robot import ANYWHERE, Joint, Kind
 
 Indices = NDArray[np.intp]
 
@@ -180,22 +180,32 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
     """Note low-passed positions and velocities that exceed the joint's limits by less than a wrong unit would.
 
     Positions far beyond are warned of: with another zero than the robot's, gravity and forces at the tip are wrong.
+    The remedy has the line of study.toml that states limits which hold this motion.
     """
-    beyond, limits, severity = [], (joint.limits.q, joint.limits.dq), "note"
-    for what, unit, x, (least, most) in zip(("positions", "velocities"), ("", "/s"), smooth, limits, strict=False):
+    beyond, severity, wider = [], "note", [*joint.limits.motion]
+    for i, (what, unit) in enumerate((("positions", ""), ("velocities", "/s"))):
+        x, (least, most) = smooth[i], wider[i]
         low, high = np.percentile(x, (1.0, 99.0))
         slack, largest = OVER_LIMITS * (most - least), max(-least, most)
         exceeds = low < least - slack or high > most + slack
         if exceeds and max(-low, high) <= MAX_BEYOND_LIMITS * largest:
             reach = joint.unit(f"{what} from {low:.3g} to {high:.3g} {{position}}{unit}")
             beyond.append(f"{reach} where the robot states {least:.3g} to {most:.3g}")
+            step = 10.0 ** (np.floor(np.log10(most - least)) - 1.0)
+            wider[i] = min(least, float(np.floor(low / step) * step)), max(most, float(np.ceil(high / step) * step))
             if what == "positions" and max(least - low, high - most) > FAR_OVER_LIMITS * (most - least):
                 severity = "warning"
     if beyond:
-        depends = "gravity and forces at the tip depend" if joint.kind is Kind.REVOLUTE else "forces at the tip depend"
+        depends = "gravity and the arm's pose depend" if joint.kind is Kind.REVOLUTE else "the arm's pose depends"
         zero = f"the zero of positions (`offset`), on which {depends}"
         other = zero if beyond[0].startswith("positions") else "the `rate`"  # an offset changes no velocity
-        remedy = f"correct the units, or {other}, or `limits` in [robot_overrides], by which `excite` designs"
+        pairs = [(name, pair) for name, pair in zip(("q", "dq", "ddq"), wider, strict=True) if pair != ANYWHERE]
+        stated = [f"{name} = [{low:.6g}, {high:.6g}]" for name, (low, high) in pairs]
+        stated += [f"effort = {joint.limits.effort:.6g}"] * bool(np.isfinite(joint.limits.effort))
+        line = (
+            f"`limits = {{ {', '.join(stated)} }}` in [robot_overrides.{joint.name}] of study.toml or the robot's file"
+        )
+        remedy = f"correct the units, or {other}, or the limits, by which `excite` designs, if these are wrong: {line}"
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"
         yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", severity, text)
 
