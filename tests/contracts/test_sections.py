@@ -36,6 +36,7 @@ from davinci_forces.records import (
     Weight,
 )
 from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.records.record import diagnostic
 from davinci_forces.report import verdicts
 from davinci_forces.report.changes import Change, StatedValue
@@ -1310,3 +1311,34 @@ def test_a_choice_that_errs_surely_more_than_the_plain_model_says_what_to_compar
         about = replace(full, results=Results(full.results | less))
         text = joints.compared_with_plain(about, "hand_roll", used, plain)
         assert text.endswith('did not help: compare `fit = "independent.lse"` in study.toml.') == is_worse
+
+
+def test_a_detection_level_is_said_to_be_of_the_runs_that_no_fit_used(full: Context):
+    texts = [parts.chapters("explanations.md")[name] for name in ("contacts", "free-space-table", "trust")]
+    pages = [guide.page(topic).as_text for topic in ("record", "stages", "results", "start", "labview", "records")]
+    texts += [*pages, guide.page("detection level").as_text, parts.chapters("methods.md")["Threshold"]]
+    for text in texts:
+        assert "that no fit used" in " ".join(text.split()), text[:200]
+    assert "that no fit used" in QUANTITIES["detection_level"].meaning
+    assert "free-motion samples of the worst run that no fit used stay;" in paragraph(full)
+    spaces = [replace(space, role="identification") for space in full.catalogue.records(FreeSpace)]
+    fitted = Catalogue(lambda kind: spaces if kind is FreeSpace else full.catalogue.records(kind))
+    assert "of the worst run (of those that no fit used, if there are any) stay;" in paragraph(
+        replace(full, catalogue=fitted)
+    )
+
+
+@pytest.mark.parametrize(("name", "kind"), [("runs", Track), ("prediction", Prediction)])
+def test_the_worst_run_of_a_figure_is_said_to_be_of_those_that_no_fit_used(full: Context, name: str, kind: type):
+    def captions(about: Context) -> list[str]:
+        figures = [block for block in walk(written(name, about)) if isinstance(block, Figure)]
+        return [figure.caption for figure in figures if "the worst run of this joint" in figure.caption]
+
+    assert captions(full)
+    roles = {
+        k: [replace(record, role="identification") for record in full.catalogue.records(k)] for k in (kind, FreeSpace)
+    }
+    fitted = replace(full, catalogue=Catalogue(lambda of: roles.get(of) or full.catalogue.records(of)))
+    assert all("that no fit used" in caption for caption in captions(full))
+    assert captions(fitted)
+    assert not any("that no fit used" in caption for caption in captions(fitted))

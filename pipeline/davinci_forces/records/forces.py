@@ -168,7 +168,7 @@ class FreeSpace(FreeEffort):
 
 
 class Threshold(JointRecord):
-    """The detection level for contacts on a joint: the level of the log with the largest effort in free space."""
+    """The detection level for contacts on a joint: the highest level of its logs that were not fitted, if any."""
 
     KEY = ("joint", "filter")
     PUBLISHED = ("threshold.{joint}: detection_level± alarm_level±", "band.{joint}: coverage± band_width")

@@ -76,6 +76,8 @@ def paragraph_for_paper(context: Context) -> str:
         + " (and gave a torque constant in use)" * (grade_of_mass(context, weight)[1] == "taken")
         for weight in context.catalogue.records(Weight) if isfinite(weight.stated_mass)
     ]  # fmt: skip
+    spaces = [context.worst_space(joint.name) for joint in robot.joints]
+    unfitted = all(space.role != "identification" for space in spaces if space is not None)
     is_logged = any(motion.velocity == "logged" for motion in context.catalogue.records(Motion))
     paragraph = explanation(
         "paper",
@@ -89,6 +91,7 @@ def paragraph_for_paper(context: Context) -> str:
         together="".join(together).replace("_", " "),
         lowpass=f"{settings.lowpass:g}",
         walk=f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})",
+        unfitted=" that no fit used" if unfitted else " (of those that no fit used, if there are any)",
         masses=f" Of known masses, {as_list(masses)}." if masses else "",
     )
     return fill(paragraph, 88, break_on_hyphens=False)

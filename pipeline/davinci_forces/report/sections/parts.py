@@ -63,6 +63,11 @@ def section_of(
     return decorate
 
 
+def fit_condition(run: Any) -> str:
+    """What is added to the words "worst run", which is sought among the runs that no fit used, if there are any."""
+    return " that no fit used" if run.role != "identification" else ""
+
+
 def run_cells(run: Any) -> tuple[str, str]:
     """The first cells of a row about a record of a joint in a log."""
     return literal(run.log), title(run.joint)

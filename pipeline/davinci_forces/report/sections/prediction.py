@@ -70,8 +70,9 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
     name, windows = parts.run_name(p), parts.spans(context.study.log(p.log).contact, "contact")
-    error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error")
-    caption = parts.explanation("prediction-figure", run=name, fit=fit_name(p.model, p.estimator))
+    error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.number(f"{p.prefix}.model_error", 2)
+    fit = fit_name(p.model, p.estimator)
+    caption = parts.explanation("prediction-figure", run=name, unfitted=parts.fit_condition(p), fit=fit)
     alt = f"{name}: the model error is {size}."
     panels = (
         parts.effort_panel(p, *windows),
