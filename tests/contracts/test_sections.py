@@ -16,6 +16,7 @@ from davinci_forces import guide
 from davinci_forces.records import (
     KINDS,
     Average,
+    Choice,
     Contact,
     Diagnostic,
     Excitation,
@@ -1342,3 +1343,25 @@ def test_the_worst_run_of_a_figure_is_said_to_be_of_those_that_no_fit_used(full:
     assert all("that no fit used" in caption for caption in captions(full))
     assert captions(fitted)
     assert not any("that no fit used" in caption for caption in captions(fitted))
+
+
+def test_the_choice_names_the_model_in_use_where_another_took_the_place_of_the_chosen_one(full: Context):
+    def said(estimator: str, fit: str = "chosen") -> str:
+        every = full.catalogue.records(Prediction)
+        predictions = [replace(p, estimator=estimator) if p.model == "chosen" else p for p in every]
+        records = Catalogue(lambda kind: predictions if kind is Prediction else full.catalogue.records(kind))
+        study = replace(full.study, settings=replace(full.study.settings, fit=fit))
+        blocks = written("choice", replace(full, catalogue=records, study=study)).blocks
+        [verdict] = [block.text for block in blocks if isinstance(block, Verdict)]
+        return verdict
+
+    [choice, *_] = full.catalogue.records(Choice)
+    assert said("ridge").startswith(f"**Chosen: “{choice.chosen}”.** ")
+    replaced = said("consistent")
+    assert replaced.startswith(f"**In use: “chosen, consistent”. First chosen: “{choice.chosen}”.** ")
+    assert "parameters that a mechanism can have take their place" in replaced
+    stated = said("ridge", "independent.wlse")
+    assert stated.startswith(
+        f"**In use: “independent, WLSE”, by the setting `fit`. By the scores: “{choice.chosen}”.**"
+    )
+    assert "take their place" not in stated

@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Choice, ModelSearch
-from davinci_forces.records.record import slug
+from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.record import as_list, slug
 from davinci_forces.report.content import Block, Figure, OnScreen, Panel, Prose, Table, Verdict, in_format, literal
 from davinci_forces.report.content.marks import Points
-from davinci_forces.report.context import Context, title
+from davinci_forces.report.context import Context, fit_name, title
 from davinci_forces.report.sections.parts import explanation, section_of
 
 
@@ -17,16 +18,28 @@ def section(context: Context, choices: list[Choice]) -> Iterator[Block]:
     """The choice with its scores."""
     choice = choices[0]
     yield from map(Prose, explanation("choice").split("\n\n"))
-    why = choice.why.removeprefix(choice.chosen)  # the choice is named once
-    it = "It" if why != choice.why else ""
-    yield Verdict("info", f"**Chosen: “{literal(choice.chosen)}”.** {it}{literal(why)}.")
-    caption = "The best candidate of each structure and added friction."
+    yield Verdict("info", choice_in_words(context, choice))
+    caption = "The best candidate of each structure and added friction. Bold: chosen by the scores."
     yield table(context, choice, best_rows(choice), caption, "choice-table")
     yield from search_tables(context)
     yield figure(choice)
     order = np.argsort(choice.score, kind="stable").tolist()
     every = table(context, choice, order, "Every candidate, the best first.", "candidates-table")
     yield OnScreen("Every candidate", "all-candidates", (every,))
+
+
+def choice_in_words(context: Context, choice: Choice) -> str:
+    """State the model in use, where it is not the chosen candidate as it was fitted, and why that one was chosen."""
+    used = dict.fromkeys(context.used_fit(fit.group) for fit in context.own_fits())
+    names = as_list([f"“{fit_name(*name.partition('.')[::2])}”" for name in used])
+    why = choice.why.removeprefix(choice.chosen)  # the choice is named once
+    why = f"{'It' if why != choice.why else ''}{literal(why)}."
+    chosen = f"“{literal(choice.chosen)}”"
+    if context.study.settings.fit != CHOSEN:
+        return f"**In use: {names}, by the setting `fit`. By the scores: {chosen}.** {why}"
+    if f"{CHOSEN}.consistent" in used:
+        return f"**In use: {names}. First chosen: {chosen}.** {why} {explanation('choice-replaced')}"
+    return f"**Chosen: {chosen}.** {why}"
 
 
 def search_tables(context: Context) -> Iterator[Block]:
