@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces import guide
+from davinci_forces.filters.response import noise_model
 from davinci_forces.records import (
     KINDS,
     Average,
@@ -20,6 +21,7 @@ from davinci_forces.records import (
     Contact,
     Diagnostic,
     Excitation,
+    FilterNoise,
     Fit,
     FreeSpace,
     Identifiability,
@@ -32,6 +34,7 @@ from davinci_forces.records import (
     Push,
     Spectrum,
     Stiffness,
+    Streamed,
     TipContact,
     Track,
     Weight,
@@ -82,6 +85,9 @@ from davinci_forces.report.sections import (
 )
 from davinci_forces.report.sections import (
     contacts as contacts_section,
+)
+from davinci_forces.report.sections import (
+    filters as filters_section,
 )
 from davinci_forces.report.sections import (
     weight as weight_section,
@@ -1365,3 +1371,79 @@ def test_the_choice_names_the_model_in_use_where_another_took_the_place_of_the_c
         f"**In use: “independent, WLSE”, by the setting `fit`. By the scores: “{choice.chosen}”.**"
     )
     assert "take their place" not in stated
+
+
+def test_contacts_found_as_samples_arrive_are_counted_log_by_log(full: Context):
+    [stream, *_] = [s for s in full.catalogue.records(Streamed) if s.joint == "hand_roll"]
+    level = full.results["stream.hand_roll.alarm_level"].value
+    peak = np.array([2.0, -3.0, 0.5]) * level
+    some = dict.fromkeys(stream.columns(), peak)
+    touched = replace(stream, **some)
+    free = replace(stream, **dict.fromkeys(stream.columns(), peak[:0]))
+    table = filters_section.stream_table(full, [touched, free])
+    assert [row[-1] for row in table.rows] == ["2 of 3", "–"]
+    whole = filters_section.stream_table(full, full.catalogue.records(Streamed))
+    by_joint: dict[str, int] = {}
+    for row in whole.rows:
+        by_joint[row[0]] = by_joint.get(row[0], 0) + int(row[-1].partition(" of ")[0].replace("–", "0"))
+    for joint, found in by_joint.items():
+        name = joint.lower().replace(" ", "_")
+        assert found == full.results[f"stream.{name}.contacts_found"].value
+
+
+def test_a_model_error_of_zero_is_nowhere_printed_as_an_error(full: Context):
+    """It is the root of a difference that is cut off at zero, so twice its standard error bounds it."""
+    error = {key: replace(x, value=0.0, std=0.016) for key, x in full.results.items() if key.endswith(".model_error")}
+    predictions = [
+        replace(p, model_error=0.0, model_error_std=0.016, effort_rms=1.0) for p in full.catalogue.records(Prediction)
+    ]
+    records = Catalogue(lambda kind: predictions if kind is Prediction else full.catalogue.records(kind))
+    about = replace(full, catalogue=records, results=Results(full.results | error))
+    tables = [block for block in walk(written("prediction", about)) if isinstance(block, Table)]
+    tables.append(summary.trust_table(about, [parts.trust(about, "hand_roll")]))
+    columns = {name: i for i, name in enumerate(tables[0].header)}
+    for row in tables[0].rows:
+        assert str(row[columns["Model error"]]).startswith("< 0.032 N")
+        assert row[columns["Relative error"]] == "< 4 %"
+    cells = [cell for table in tables for row in table.rows for cell in row if isinstance(cell, Number)]
+    errors = [cell for cell in cells if cell.key.endswith(".model_error")]
+    assert len(errors) > len(tables[0].rows)
+    assert {cell.text for cell in errors} == {"< 0.032"}
+    assert "< 4 %" in tables[-1].rows[0]
+    assert "0.000" not in paragraph(about).partition("Results")[2].partition("detection")[0]
+
+
+def test_a_log_with_a_mass_has_the_period_over_which_its_effort_is_averaged(full: Context):
+    [load, *_] = [load for load in full.catalogue.records(Load) if load.log == load.weight]
+
+    def shown(period: float) -> tuple[str, str]:
+        loads = [replace(load, period=period, periods=4)]
+        records = Catalogue(lambda kind: loads if kind is Load else full.catalogue.records(kind))
+        table = runs.overview(replace(full, catalogue=records), full.catalogue.records(LogSummary))
+        [row] = [row for row in table.rows if row[0] == load.log]
+        return str(row[-2]), str(row[-1])
+
+    assert shown(2.5) == ("2.5 s", "4")
+    assert shown(0.0) == ("–", "–")
+
+
+def test_the_smoother_that_filters_are_compared_with_has_a_random_walk_of_its_own(full: Context):
+    """So its numbers differ from those of the report's smoother, and both tables say why."""
+    noise = next(noise for noise in full.catalogue.records(FilterNoise) if noise.joint == "hand_roll")
+    joint = replace(full.study.robot.joint("hand_roll"), q_tau=0.0)
+    walks = {name: noise_model(noise, joint, 1.0 / noise.rate, 0.0, name).q_tau for name in ("ekf", "rts")}
+    assert walks["rts"] != walks["ekf"]
+    tables = {block.label: block.caption for block in walk(written("filters", full)) if isinstance(block, Table)}
+    assert "has a random walk of its own (unless the study states one)" in tables["filter-comparison"]
+    assert "differ from those in [@real-time-cost]" in tables["filter-comparison"]
+    assert "so the smoother's numbers differ there" in tables["real-time-cost"]
+
+
+def test_a_lifted_mass_has_its_reason_for_a_large_error_and_other_joints_have_none(full: Context):
+    def told(name: str) -> list[bool]:
+        blocks = [*joints.joint_blocks(full, [fit for fit in full.own_fits() if fit.group == name])]
+        return [isinstance(b, Prose) and b.text.startswith("Friction that differs by direction") for b in blocks]
+
+    after = told("instrument_slide")
+    assert (after.count(True), after[2]) == (1, True)  # below its table
+    assert not any(told("hand_roll"))

@@ -12,6 +12,7 @@ from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.quantities import PER_ROW
 from davinci_forces.records.record import Published
 from davinci_forces.report.content.number import Number
+from davinci_forces.report.verdicts import is_hidden
 
 REASONS = {  # why a number has no standard error -> patterns of its key; a study may have too few data for one
     "exact": (  # computed without noise from exact numbers
@@ -65,7 +66,9 @@ class Result:
 
     def number(self, digits: int = 4) -> Number:
         """The number as a report prints it."""
-        return Number(self.value, format_unit(self.unit), self.std, self.key, digits)
+        hidden = self.key.endswith(".model_error") and is_hidden(self.value, self.std)
+        least = float(f"{2.0 * (self.std or 0.0):.2g}") if hidden else None
+        return Number(self.value, format_unit(self.unit), self.std, self.key, digits, least)
 
 
 class Results(dict[str, Result]):

@@ -19,8 +19,10 @@ from davinci_forces.report.content import Level
 from davinci_forces.report.content.number import Number, in_format
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
+NO_ERROR = 0.05  # of its standard error: a smaller model error is stated as below twice its standard error
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
+LIFTED_MASS = "lifted mass"  # the parameter of a slide that a reversed direction makes negative
 TURN_AROUND = "write `sign = -1` with its position, velocity and effort, all three"
 CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
@@ -273,6 +275,19 @@ def band_in_words(coverage: float, coverage_std: float = 0.0) -> str:
 def percent(share: float) -> str:
     """A share as it is printed."""
     return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else in_format(round(100 * share), "d") + " %"
+
+
+def is_hidden(error: float, std: float | None) -> bool:
+    """Whether a model error, the root of a difference that is at least 0, would be printed as 0.00 ± 0.12."""
+    return bool(std) and error <= NO_ERROR * (std or 0.0)
+
+
+def error_share(p: Prediction | None) -> str:
+    """The model error over the root mean square of the effort, as it is printed; at most twice its error if hidden."""
+    if p is None or not p.effort_rms > 0.0:
+        return percent(math.nan)
+    most = f"< {max(math.ceil(200.0 * p.model_error_std / p.effort_rms), 1)} %"
+    return most if is_hidden(p.model_error, p.model_error_std) else percent(p.model_error / p.effort_rms)
 
 
 def thresholds() -> list[tuple[str, ...]]:

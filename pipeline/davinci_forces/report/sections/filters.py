@@ -67,8 +67,9 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
     rows = []
     for s in logs:
         of_log, prefix = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}"
-        of_joint = context.number(f"{prefix}.alarm_level", 2), context.count(f"{prefix}.contacts_found")
-        rows.append((*run_cells(s)[::-1], *of_log, *of_joint))
+        level = context.results[f"{prefix}.alarm_level"]
+        found = f"{int((abs(s.peak) > level.value).sum())} of {len(s)}" if len(s) else "–"
+        rows.append((*run_cells(s)[::-1], *of_log, level.number(2), found))
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(explanation("stream"), header, rows, "stream", "llrrrrrr")
 

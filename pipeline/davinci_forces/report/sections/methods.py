@@ -14,7 +14,7 @@ from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.sections.parts import chapters, explanation, grade_of_mass, of_joint, section_of, trust
-from davinci_forces.report.verdicts import percent, thresholds
+from davinci_forces.report.verdicts import error_share, thresholds
 
 BIBLIOGRAPHY = Path(__file__).with_name("references.bib")
 ENTRY, FIELD = re.compile(r"@\w+\{.*?^\}", re.M | re.S), re.compile(r"^  (\w+) = \{(.*)\},$", re.M)
@@ -146,7 +146,7 @@ def unseen_score(context: Context, joint: str) -> str:
     parts += [f"besides the effort of the links {terms}" if len(efforts) > 1 else terms]
     parts += [] if fit.periods else [f"low-pass of {fit.cutoff[efforts.index(joint)]:g} Hz"]
     where = f"{p.log}, on the fitted path" if trusted.same_path else p.log
-    error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({percent(trusted.share)} of the effort) on {where}"
+    error = f"error {context.number(f'{p.prefix}.model_error', 2)} ({error_share(p)} of the effort) on {where}"
     levels = ("detection level", "alarm level")
     keys = {name: f"threshold.{joint}.{name.replace(' ', '_')}" for name in levels}
     keys["mean coverage"] = f"band.{joint}.coverage"

@@ -7,7 +7,7 @@ from davinci_forces.report.content import Block, Cell, Figure, OnScreen, Panel, 
 from davinci_forces.report.content.marks import Line
 from davinci_forces.report.context import Context, fit_name, label, title
 from davinci_forces.report.sections import parts
-from davinci_forces.report.verdicts import is_out_of_log, percent
+from davinci_forces.report.verdicts import error_share, is_out_of_log, percent
 
 
 @parts.section_of("Prediction", "prediction", Prediction)
@@ -31,14 +31,13 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
 
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
-    share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
     is_fitted = p.role == "identification"
     how = p.scheme.removeprefix("leave ").removesuffix(" out") if is_fitted else "never fitted"
     how = how if context.study.log(p.log).has_known_free_motion else f"{how}; contacts in it"
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
     error, mean, r2, ceiling = context.numbers(p.prefix, ("model_error", "mean_error", "r2", "r2_ceiling"), 2)
-    return *parts.run_cells(p), how, new, error, mean, share, r2, ceiling
+    return *parts.run_cells(p), how, new, error, mean, error_share(p), r2, ceiling
 
 
 def every_score(context: Context, predictions: list[Prediction]) -> Table:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records import Diagnostic, Explanation, LogSummary, Signal, Track, first_of_each_kind
+from davinci_forces.records import Diagnostic, Explanation, Load, LogSummary, Signal, Track, first_of_each_kind
 from davinci_forces.records.forces import SMOOTHER, FilterNoise, FreeSpace
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
@@ -138,7 +138,9 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
     for summary in summaries:
         log, period = f"log.{summary.log}", f"period.{summary.log}"
         clock = *context.numbers(log, ("rate", "duration"), 5), context.number(f"{log}.jitter", 2)
-        periods = context.number(period, 6, std=None), context.count(f"{period}.periods")
+        periods: tuple[Cell, ...] = context.number(period, 6, std=None), context.count(f"{period}.periods")
+        for load in context.catalogue.select(Load, log=summary.log, weight=summary.log):
+            periods = (f"{load.period:.6g} s", str(load.periods)) if load.period else periods
         samples = context.count(f"{log}.rows")
         rows.append((literal(summary.log), summary.role, summary.format, samples, *clock, *periods))
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")

@@ -16,7 +16,7 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.details import convergence, correlations, estimators, friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import explanation, is_of_link, of_free_motion, of_joint, run_name, section_of
-from davinci_forces.report.verdicts import is_impossible
+from davinci_forces.report.verdicts import LIFTED_MASS, is_impossible
 
 PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error from model", "$z$")
 
@@ -43,6 +43,8 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     used = context.used_record(joint) or plain
     yield equation(joint, used)
     yield parameters(context, joint, used)
+    if LIFTED_MASS in of_joint(used, joint).values():
+        yield Prose(explanation("joints-lifted-mass"))
     if used is not plain:
         yield Prose(compared_with_plain(context, joint, used, plain))
     model, _, by = (context.own_fit if used is plain else context.used_fit)(joint).partition(".")

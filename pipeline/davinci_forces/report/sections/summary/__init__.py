@@ -17,7 +17,7 @@ from davinci_forces.report.results import unit_of
 from davinci_forces.report.sections import parts
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
-from davinci_forces.report.verdicts import Trust, band_in_words, percent
+from davinci_forces.report.verdicts import Trust, band_in_words, error_share, percent
 from davinci_forces.robots.robot import Kind
 
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
@@ -280,7 +280,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint."""
-    space, sought, share = trusted.space, trusted.sought, percent(trusted.share)
+    space, sought, share = trusted.space, trusted.sought, error_share(trusted.prediction)
     scored, free = (about.prefix if about is not None else "" for about in (trusted.prediction, space))
     error, level = context.number(f"{scored}.model_error", 2), context.number(f"{free}.detection_level", 2)
     alarm = context.number(f"threshold.{trusted.joint}.alarm_level", 2, std=None)

@@ -18,7 +18,6 @@ from davinci_forces.report.verdicts import Trust, is_mostly_constant, percent
 SPOILS_ALL = re.compile("^resample|A of .* counts as")
 # In a warning of any stage that blames units, or leaves a joint without an answer, or free motion in doubt.
 COMES_FIRST = re.compile("check the units|its external effort is not estimated|something seems to touch the arm")
-LIFTED_MASS = "lifted mass"  # the parameter that a reversed direction makes negative
 LACKS_LOGS = "arm: no identification log moves"  # so begins advice that a log that failed may have followed
 FIRST_OF_ALL, FIRST, WARNING = 200.0, 100.0, 1.5  # weights of these two kinds of warnings, and of others
 MAX_NARROW = 2.4  # largest weight of a narrow band: less than that of an error for which a joint's verdict is a problem
@@ -147,9 +146,9 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
     impossible = [verdicts.is_impossible(*of) for of in zip(fit.theta, fit.theta_std, strict=True)]
     if wrong := [name for i, name in of_joint(fit, joint).items() if fit.positive[i] and impossible[i]]:
         text = explanation("negative", parameters=as_list(wrong))
-        if LIFTED_MASS in wrong:
+        if verdicts.LIFTED_MASS in wrong:
             text = explanation("negative-mass", remedy=verdicts.TURN_AROUND)
-        yield FIRST if LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
+        yield FIRST if verdicts.LIFTED_MASS in wrong else WARNING, f"**{title(joint)}**: {text} See [@joints]."
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:

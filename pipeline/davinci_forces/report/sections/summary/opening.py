@@ -8,6 +8,7 @@ import numpy as np
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, HandLimit, Stiffness, TipContact, TipForce, Weight
 from davinci_forces.records.record import as_list
+from davinci_forces.report import verdicts
 from davinci_forces.report.content import Level, Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
 from davinci_forces.report.sections.parts import RATINGS, grade_of_mass
@@ -57,7 +58,7 @@ def errors(trusts: Sequence[Trust]) -> Iterator[str]:
     for trusted in trusts:
         name = name_in_sentence(trusted.joint)
         path = "the fitted path" if trusted.same_path else "an unseen path"
-        level, error = trusted.level, f"{percent(trusted.share)} on {name}"
+        level, error = trusted.level, f"{verdicts.error_share(trusted.prediction)} on {name}"
         if trusted.fineness > DETECTABLE:
             level, error = "bad", f"{error}, whose detection level is above the effort sought"
         kinds.setdefault((path, "too much to be believed" if level == "bad" else ""), []).append(error)
