@@ -251,7 +251,9 @@ def test_a_joint_that_does_not_repeat_is_left_out_by_name_and_the_others_go_on()
 def test_a_transient_in_one_period_is_remarked_on():
     roll = arm.signal("hand_roll")
     _, notes = run([replace(roll, q=roll.q + 0.002 * np.exp(-roll.t))])
-    assert any("period 1 of 10 differs from the others" in text for note in notes for text in note.text)
+    assert any(
+        "the period from 0.00 to 10.00 s differs from the others" in text for note in notes for text in note.text
+    )
 
 
 def test_a_gap_lowers_the_counts_of_the_phases_that_it_covers():

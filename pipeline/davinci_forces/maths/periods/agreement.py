@@ -25,6 +25,7 @@ class Difference(NamedTuple):
     signal: int
     period: int  # counted from 0
     periods: int
+    start: float  # [s] of the period
     rms: float  # of the difference beyond noise
     ratio: float  # root mean square of the difference over what noise explains
 
@@ -158,7 +159,8 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
             rho = _lag_one_of_others(np.delete(sums, m, axis=0), np.delete(counts, m, axis=0))
             if is_unlikely(float(ratio[m]) ** 2, rho, K, degrees[m]):
                 period, periods = int(number[first[m]]), int(number[-1]) + 1
-                differences.append(Difference(signal, period, periods, float(rms[m]), float(ratio[m])))
+                sizes = float(rms[m]), float(ratio[m])
+                differences.append(Difference(signal, period, periods, float(t[0]) + period * length, *sizes))
     return differences
 
 

@@ -148,36 +148,37 @@ def longest_stretch(
 def omissions(
     first: Signal, periodic: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
 ) -> Iterator[Diagnostic]:
-    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out.
+    """Describe samples that do not repeat or repeat badly, what uses them, and the keys of study.toml that remove them.
 
-    Less than two periods at either end, as of a rest, a run-in or a stop, are expected, so they are a note.
+    Times count from the log's first sample, as `skip` and `until` do.  Less than two periods at either end, as of a
+    rest, a run-in or a stop, are expected, so they are a note.
     """
     t, gaps = first.t, gaps_at(first, periodic)
-    sides = [f"the {t[periodic.start] - t[0]:.2f} s before"] * (periodic.start > 0)
-    sides += [f"the {t[-1] - t[periodic.stop - 1]:.2f} s after"] * (periodic.stop < len(t))
-    counted = f" from {t[periodic.start]:.2f} s on" * bool(sides)
-    faults = []
-    if sides:
-        what = f"as in a stop, a ramp or another motion{gaps}"
-        faults.append(f"{' and '.join(sides)} do not repeat, {what}")
+    first_time, last_time = t[periodic.start], t[periodic.stop - 1]
+    sides = [f"the {first_time - t[0]:.2f} s before {first_time:.2f} s"] * (periodic.start > 0)
+    sides += [f"the {t[-1] - last_time:.2f} s after {last_time:.2f} s"] * (periodic.stop < len(t))
+    faults = [f"{' and '.join(sides)} do not repeat, as in a stop, a ramp or another motion{gaps}"] * bool(sides)
     for name, d in differing:
         inside = d.has_periods_on_both_sides
-        long = t[agreeing.start] - t[periodic.start] > MIN_REPORTED_TRANSIENT * length
+        long = t[agreeing.start] - first_time > MIN_REPORTED_TRANSIENT * length
         if inside or long or not sides:  # beside a standstill, a short transient is expected
-            fewer = d.periods < differing[0][1].periods
-            number = f"the remaining {d.periods}" if fewer else f"{d.periods}"
-            differs = f"period {d.period + 1} of {number}{counted} differs from the others by {d.rms:.3g} rms in {name}"
+            span = f"the period from {d.start:.2f} to {d.start + length:.2f} s"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
-            faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
+            size = f"{d.rms:.3g} rms in {name}, {d.ratio:.1f} times what noise explains"
+            faults.append(f"{span} differs from the others by {size}, {what}")
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
     keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
-    evaluated = f"{'only ' if keys else ''}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
-    advice = f"; to confirm this, write {' and '.join(keys)} in study.toml" if keys else ""
-    repeats = f"{first.log}: joints repeat every {length:.4f} s"
+    start, whole = t[agreeing.start], whole_periods(t[agreeing], length, first.rate)
+    of_all = f"of the {(last_time - first_time + 1.0 / first.rate) / length:.1f} periods from {first_time:.2f} s on"
+    averaged = f"{of_all}, the {whole} from {start:.2f} to {start + whole * length:.2f} s are averaged"
+    uses = "; noise levels and fits to averages leave out the rest, but the chosen model is fitted to all motion"
+    remedy = f"only if something touched the arm there, or the log is faulty there, write {' and '.join(keys)}"
+    advice = f"{uses}; {remedy} in study.toml, which removes the rest from all fits" if keys else ""
     short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) < 2.0 * length
     expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
     if faults:
-        text = f"{repeats}; {'; '.join(faults)}; {evaluated}{advice}"
+        repeats = f"{first.log}: joints repeat every {length:.4f} s"
+        text = f"{repeats}; {'; '.join(faults)}; {averaged}{advice}"
         yield diagnostic("average", first.log, "note" if expected else "warning", text)
 
 
