@@ -388,6 +388,10 @@ def test_a_tare_takes_away_what_repeats_along_the_path_wherever_it_began():
 
 def test_a_tare_of_another_path_is_not_subtracted_and_that_is_said():
     weight, _, said = study(3, tare="empty", tare_path=0.8)
+    without_line, _, silent = study(3, tare_path=0.8)
+    assert (weight.mass, weight.mass_std) == (without_line.mass, without_line.mass_std)
+    assert not any("tare" in text for text in silent)
+    assert any("record the tare along the same path, or delete that line" in text for text in said)
     assert weight.tare == ""
     assert np.isnan(weight.tare_mass)
     assert any("heavy: its tare empty is not on the same path: at best it is off by" in text for text in said)

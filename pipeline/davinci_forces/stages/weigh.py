@@ -127,7 +127,8 @@ def gather(
             continue
         if fault:
             message = f"{weight_log.log}: its tare {weight_log.tare} {fault}, and is not subtracted"
-            yield diagnostic("weigh", f"{weight_log.log}.mass", "warning", f"{message}; record it along the same path")
+            remedy = "the mass is then of the model alone: record the tare along the same path, or delete that line"
+            yield diagnostic("weigh", f"{weight_log.log}.mass", "warning", f"{message}; {remedy}")
         yield from estimate_mass(weight_log, weight_loads, tare, others, robot, spread)
 
 
