@@ -218,6 +218,14 @@ def test_an_end_that_the_log_does_not_reach_is_remarked_on(lab):
     assert "bad: until = 61 s leaves nothing out, because the log ends after 9.98 s" in said
 
 
+@pytest.mark.parametrize("name", ["contact", "free"])
+def test_a_window_that_the_log_does_not_reach_is_remarked_on(lab, name):
+    describe(lab, more=f"{name} = [[70, 80]]")
+    said = " ".join(call("ingest", lab).split())
+    window = f"bad: the {name} window 70 to 80 s lies outside the log, which goes from 0 to 9.98 s"
+    assert f"{window} from its first sample on; correct `{name}` in study.toml" in said
+
+
 def test_too_little_before_the_end_is_refused(lab):
     describe(lab, more="until = 0.005")
     assert "1 samples are too few, with 0 s skipped at the start and those after 0.005 s left out" in run(lab)

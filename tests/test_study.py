@@ -83,6 +83,11 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ("period = 10", "period = -1", "7: log 'a': period must be positive, not -1"),
         ("period = 10", 'period = "ten"', "7: log 'a': period must be a number, not 'ten'"),
         ("contact = [[1, 2]]", "contact = [[2, 1]]", "8: log 'a': contact must be a list of [start, end]"),
+        (
+            "contact = [[1, 2]]",
+            "contact = [[13, 19.3]]\nfree = [[0, 3], [2, 14]]",
+            "9: log 'a': free [2, 14] and contact [13, 19.3] share 13 to 14 s; shorten one, so that no time is in both",
+        ),
         ("contact = [[1, 2]]", "colour = 1", "8: log 'a': unknown key 'colour'"),
         (
             "hand_roll.theta_m",

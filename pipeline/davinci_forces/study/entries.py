@@ -79,6 +79,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         contact=_windows(table, "contact"), free=_windows(table, "free"), weight=_weight(table, robot),
         tare=table.text("tare", ""), options=_options(table),
     )  # fmt: skip
+    _check_apart(table, entry)
     table.close()  # reports unknown keys
     return entry
 
@@ -152,6 +153,15 @@ def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
         if not 0 <= start < end:
             table.problem(f"{key} must be {WINDOWS}, not [{start:g}, {end:g}]", key, i)
     return windows
+
+
+def _check_apart(table: TomlTable, entry: LogEntry) -> None:
+    """Report a problem for each free window that shares time with a contact window."""
+    for i, (start, end) in enumerate(entry.free):
+        for first, last in entry.contact if entry.contact != WHOLE_LOG else ():
+            if max(start, first) < min(end, last):
+                shared = f"{max(start, first):g} to {min(end, last):g} s; shorten one, so that no time is in both"
+                table.problem(f"free [{start:g}, {end:g}] and contact [{first:g}, {last:g}] share {shared}", "free", i)
 
 
 def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:

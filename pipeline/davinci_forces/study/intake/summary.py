@@ -51,11 +51,10 @@ def remarks(intake: Intake) -> Iterator[str]:
         jumps = f"by {when} ..." if len(intake.jumps) > 5 else f"by {when}"
         remedy = "The later times are moved by the jump; find out why the recorder's clock jumps"
         yield f"the clock jumps while the motion continues, {jumps}. {remedy}"
-    for start, end in entry.contact:
+    for name, (start, end) in (*(("contact", of) for of in entry.contact), *(("free", of) for of in entry.free)):
         if start >= duration or end <= entry.skip:
-            span = f"the log, which goes from {entry.skip:g} to {duration:g} s"
-            window = f"the contact window {start:g} to {end:g} s"
-            yield f"{window} lies outside {span}; contact times count from the log's first sample"
+            span = f"the log, which goes from {entry.skip:g} to {duration:g} s from its first sample on"
+            yield f"the {name} window {start:g} to {end:g} s lies outside {span}; correct `{name}` in study.toml"
     if entry.until is not None and not intake.ended and duration < entry.until - GAP / clock.rate:
         why = f"because the log ends after {duration:g} s; both count from its first sample"
         yield f"until = {entry.until:g} s leaves nothing out, {why}"
