@@ -849,6 +849,9 @@ def test_contacts_of_several_joints_at_one_time_are_one_row(full: Context):
     assert not [*contacts_section.by_time(full, contacts[:1])]
     long = {"onset": np.array([0.0]), "release": np.array([9.5]), "above": np.array([1]), "peak": np.array([1.0])}
     one = replace(contacts[1], **{name: getattr(contacts[1], name)[:1] for name in contacts[1].columns()} | long)
+    elsewhere = replace(contacts[1], log="tip-2")
+    groups = parts.contacts_at_once([*contacts, elsewhere], lambda of: of.above == 1)
+    assert [[window[0] for window in group] for group in groups] == [["tip"] * 2, ["tip"], ["tip"], *2 * [["tip-2"]]]
     twice = replace(contacts[0], peak=np.array([5.0, 2.0, 1.0]))
     [table] = contacts_section.by_time(full, [twice, one])
     assert [row[2] for row in table.rows] == [full.number("contact.tip.hand_roll.1.peak")]  # the largest of a joint
@@ -873,6 +876,18 @@ def test_what_the_study_reverses_and_changes_is_listed(full: Context):
     assert f"{log.name}: {', '.join(source.quantity for source in log.channels[-2:])}" in listed
 
 
+def test_logs_that_state_the_same_start_are_named_once_where_they_were_recorded(full: Context):
+    starts = ["2026-11-02T09:12:33.5", "2026-11-02T09:12:33.5", "2026-11-02T10:00:00", "", ""]
+    of = full.catalogue.records(LogSummary)[0]
+    made = [replace(of, log=f"log-{i}", started=started) for i, started in enumerate(starts)]
+    records = Catalogue(lambda kind: made if kind is LogSummary else full.catalogue.records(kind))
+    for simulated, times in ((False, 1), (True, 0)):
+        about = replace(full, catalogue=records, study=replace(full.study, simulated=simulated))
+        said = [b.text for b in provenance.section(about).blocks if isinstance(b, Prose) and "same start" in b.text]
+        assert len(said) == times
+        assert not said or said[0].startswith("**log-0 and log-1 state the same start, ")
+
+
 def test_a_loop_of_hysteresis_has_the_scale_of_the_contact(full: Context):
     push = next(push for push in full.catalogue.records(Push) if 0 < push.inside.sum() < len(push))
     [model] = [mark for mark in tissue.hysteresis_panel(push).marks if isinstance(mark, Line)]
@@ -893,9 +908,16 @@ def test_joints_are_in_the_order_of_the_robot_whatever_logs_come_first(full: Con
 def test_contacts_that_were_found_are_not_said_to_exceed_a_level(lab: Lab, catalogue: Catalogue):
     found = [replace(c, stated=np.zeros_like(c.stated)) for c in catalogue.records(Contact)]
     about = context(lab, catalogue)
-    said = summary.opening_paragraph(about, found)
+    said = summary.opening_paragraph(about, found[:1])
     level = "above the alarm level, which free motion crosses at most once in ten minutes"
-    assert f"**{sum(map(len, found))} contacts found {level}; the study states no window of contact." in said
+    each = len(found[0])
+    assert f"**{each} contact{'s' * (each > 1)} found {level}; the study states no window of contact." in said
+    felt = [replace(found[0], joint=joint) for joint in ("hand_roll", "hand_pitch", "instrument_slide")]
+    said = summary.opening_paragraph(about, felt)
+    assert (
+        f"**{3 * each} contacts of joints, at {each} time{'s' * (each > 1)}, found {level}; the study states no window"
+        in said
+    )
     ones = [replace(c, stated=1 + 0 * c.stated, above=1 + 0 * c.above, found=0 * c.found) for c in found]
     number = sum(map(len, ones))
     said = summary.opening_paragraph(about, ones)
@@ -946,6 +968,9 @@ def test_a_joint_without_efforts_is_not_counted_and_not_sent_to_record_what_it_h
     assert "It was estimated on 1 joint of" in summary.opening_paragraph(about, [])
     [entry, *_] = [log for log in about.study.logs if log.role == "contact"]
     assert "record an identification log" in contacts_section.reason(entry, None, False)
+    [track, *_] = catalogue.select(Track, log=entry.name, at_rest=0)
+    unfelt = contacts_section.reason(entry, track, True)
+    assert "as where nothing touched the arm, or the touch does not load this joint" in unfelt
     assert contacts_section.reason(entry, None, True).startswith("its external effort is not estimated")
 
 
@@ -1154,7 +1179,7 @@ def test_page_one_states_every_peak_if_they_are_few_and_where_none_is(full: Cont
         text = summary.peaks_in_words(full, contacts)
         shown = [f"{of.onset[row]:.1f} to {of.release[row]:.1f} s" in text for of, row in above]
         assert all(shown) == (most == len(above))
-        assert text.startswith(" Contact peaks" if all(shown) else " Largest contact peaks")
+        assert text.startswith(" Contact peaks" if all(shown) else " Largest contact peak of each joint")
     for joint in dict.fromkeys(of.joint for of, _ in above):
         [(size, largest)] = sorted(
             ((abs(of.peak[row]), f"{of.onset[row]:.1f} to") for of, row in above if of.joint == joint)

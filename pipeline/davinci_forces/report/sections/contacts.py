@@ -9,7 +9,7 @@ from davinci_forces.records import Contact, Stiffness, Threshold, Track, Weight,
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import explanation, run_cells, section_of, static_frictions
+from davinci_forces.report.sections.parts import contacts_at_once, explanation, run_cells, section_of, static_frictions
 from davinci_forces.report.verdicts import is_small
 from davinci_forces.study import LogEntry
 
@@ -57,20 +57,12 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
     touching = {log: of for log, of in by_name(contacts, "log").items() if len(of) > 1}
     joints = context.joints_of([contact for of in touching.values() for contact in of])
     rows = []
-    for log, of in touching.items():
-        groups: list[list[tuple[float, float, float, str, int]]] = []
-        above = [(c, i) for c in of for i in np.flatnonzero(c.above).tolist()]
-        for window in sorted((c.onset[i], c.release[i], abs(c.peak[i]), c.joint, i) for c, i in above):
-            if groups and window[0] < max(end for _, end, *_ in groups[-1]):
-                groups[-1].append(window)
-            else:
-                groups.append([window])
-        for group in groups:
-            first, last = min(start for start, *_ in group), max(end for _, end, *_ in group)
-            largest_last = sorted(group, key=lambda window: window[2])
-            keys = {joint: f"contact.{log}.{joint}.{i + 1}.peak" for *_, joint, i in largest_last}
-            peaks = (context.number(keys[joint]) if joint in keys else "–" for joint in joints)
-            rows.append((literal(log), f"{first:.1f} to {last:.1f} s", *peaks))
+    for group in contacts_at_once((c for of in touching.values() for c in of), lambda contact: contact.above == 1):
+        log, first, last = group[0][0], min(start for _, start, *_ in group), max(end for _, _, end, *_ in group)
+        largest_last = sorted(group, key=lambda window: window[3])
+        keys = {joint: f"contact.{log}.{joint}.{i + 1}.peak" for *_, joint, i in largest_last}
+        peaks = (context.number(keys[joint]) if joint in keys else "–" for joint in joints)
+        rows.append((literal(log), f"{first:.1f} to {last:.1f} s", *peaks))
     if rows:
         header = ("Log", "Time", *map(title, joints))
         yield Table(explanation("contacts-by-time"), header, tuple(rows), "contacts-by-time", "ll" + "r" * len(joints))
@@ -153,4 +145,4 @@ def reason(entry: LogEntry, track: Track | None, is_fitted: bool) -> str:
         return explanation("contacts-at-rest")
     if entry.role != "contact":
         return f"a log of role “{entry.role}” is tracked, but its windows are not measured"
-    return "nothing stands out above the alarm level; write `contact = [[start, end]]` if there was a contact"
+    return explanation("contacts-none")

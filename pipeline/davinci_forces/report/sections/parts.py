@@ -10,7 +10,8 @@ import numpy as np
 
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.arrays import Booleans, evenly, runs
-from davinci_forces.records import Column, Fit, PathShare, Prediction, Record, Residual, TorqueConstant, Track, Weight
+from davinci_forces.records import Column, Contact, Fit, PathShare, Prediction, Record, Residual, Track
+from davinci_forces.records.weight import TorqueConstant, Weight
 from davinci_forces.records.whiteness import Whiteness
 from davinci_forces.report.content import Block, Level, OnScreen, Panel, Section, Table, literal
 from davinci_forces.report.content.marks import AnyMark, Colour, HBand, Line, Points, Reference, Stems, VSpan
@@ -22,6 +23,7 @@ RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 F = ("f_x", "f_y", "f_z")  # components of the force at the tip
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
+Window = tuple[str, float, float, float, str, int]  # log, onset, release, size of the peak, joint, and row
 
 
 def chapters(name: str) -> dict[str, str]:
@@ -191,3 +193,14 @@ def of_joint(fit: Fit, joint: str) -> dict[int, str]:
     suffix = f" of {joint}" if fit.group != joint else ""
     own = [i for i, name in enumerate(fit.parameter) if name.endswith(suffix) and not is_of_link(fit.phi[i])]
     return {i: str(fit.parameter[i]).removesuffix(suffix) for i in own}
+
+
+def contacts_at_once(contacts: Iterable[Contact], which: Callable[[Contact], Booleans]) -> list[list[Window]]:
+    """Group some of the contacts (C,): those whose windows overlap in a log."""
+    groups: list[list[Window]] = []
+    found = [(c, i) for c in contacts for i in np.flatnonzero(which(c)).tolist()]
+    for window in sorted((c.log, c.onset[i], c.release[i], abs(c.peak[i]), c.joint, i) for c, i in found):
+        if not groups or window[0] != groups[-1][0][0] or window[1] >= max(end for _, _, end, *_ in groups[-1]):
+            groups.append([])
+        groups[-1].append(window)
+    return groups

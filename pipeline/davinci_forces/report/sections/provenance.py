@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from davinci_forces.records import LogSummary
+from davinci_forces.records import LogSummary, by_name
+from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Table, literal
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.parts import explanation, paper_or_screen, section_of
@@ -29,6 +30,10 @@ def section(context: Context) -> Iterator[Block]:
         yield Prose("Quantities whose sign the study reverses (`sign = -1`):")
         yield Listing("\n".join(turned))
     if summaries := context.catalogue.records(LogSummary):
+        for started, logs in by_name([of for of in summaries if of.started], "started").items():
+            if len(logs) > 1 and not study.simulated:
+                names = as_list([literal(of.log) for of in logs])
+                yield Prose(explanation("same-start", logs=names, started=literal(started)))
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
     if provenance.study:

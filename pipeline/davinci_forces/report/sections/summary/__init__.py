@@ -122,7 +122,9 @@ def opening_paragraph(context: Context, contacts: list[Contact]) -> str:
     stated = sum(int(contact.stated.sum()) for contact in contacts)
     above = sum(int((contact.above * contact.stated).sum()) for contact in contacts)
     unstated = sum(len(contact) for contact in contacts) - stated
-    contacts_above = f"{count(unstated, 'contact')} found above"
+    times = len(parts.contacts_at_once(contacts, lambda contact: contact.stated == 0))
+    of_joints = f" of joints, at {count(times, 'time')}," * (times < unstated)  # several joints feel one touch
+    contacts_above = f"{count(unstated, 'contact')}{of_joints} found above"
     joints_of_robot = f"{count(len(joints), 'joint')} of the {literal(context.study.robot.title)}"
     some_logs = f"{len(logs)} of {count(len(context.study.logs), 'log')}"
     text = parts.explanation("answer", efforts=efforts_in_words(context), joints=joints_of_robot, logs=some_logs)
@@ -171,7 +173,8 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
         f"{level_or_impulse(context, of, row)})"
         for of, row in above
     ]
-    text = f" {'Contact' if is_short else 'Largest contact'} peaks{named}: {as_list(peaks)}." if peaks else ""
+    which = "Contact peaks" if is_short else "Largest contact peak of each joint"
+    text = f" {which}{named}: {as_list(peaks)}." if peaks else ""
     sought = {track.joint for track in context.catalogue.select(Track, role="contact")}
     # A joint that something seems to touch in free motion has a level that this touch may have raised.
     of_levels = context.catalogue.select(Diagnostic, stage="assess")
