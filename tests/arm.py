@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from davinci_forces.identification import search
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
@@ -48,6 +49,13 @@ EXCITATION = {  # Table 6.1 with its misprints corrected: period, a0, a1, b1, a2
     "instrument_slide": (5.0, 0.02, 0.0001, 0.0002, -0.1632, -0.1350),
 }
 NOISE = {"hand_roll": 0.140, "hand_pitch": 0.214, "instrument_slide": 1.345}  # roots of the printed MSE
+
+
+def coarse_grids() -> dict[str, tuple[float, ...]]:
+    """The first, the middle and the last of each grid that a model is searched on, so that every extreme is tried."""
+    names = ("CUTOFF_GRID", "LAG_GRID", "RIDGE_GRID", "DISPLACEMENT_GRID", "WIDTH_GRID", "DECAY_VELOCITY_GRID")
+    grids = {name: getattr(search, name) for name in names}
+    return {name: (grid[0], grid[len(grid) // 2], grid[-1]) for name, grid in grids.items()}
 
 
 def joint(name: str) -> Joint:

@@ -178,6 +178,16 @@ def quick_design() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def coarse_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A coarser search for models, for tests of what does not depend on which model is found."""
+    from davinci_forces.identification import search
+    from tests.arm import coarse_grids
+
+    for name, grid in coarse_grids().items():
+        monkeypatch.setattr(search, name, grid)
+
+
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
     """A folder that one of the processes that run the tests fills, and that the others wait for."""
     base = factory.getbasetemp()

@@ -113,6 +113,7 @@ def prepare(home: Path) -> None:
 
     import davinci_forces
     from davinci_forces.commands import haptics
+    from davinci_forces.identification import search
     from davinci_forces.report import report
     from davinci_forces.robots import load
     from davinci_forces.robots.urdf import writing
@@ -120,6 +121,7 @@ def prepare(home: Path) -> None:
 
     report.render_all = lambda documents: PAGES  # drawing takes seconds, and reads no file
     haptics._answer = lambda scenario, csv: FELT  # so does simulating
+    vars(search).update(arm.coarse_grids())  # and searching for a model on every value of a grid
     study = arm.write_study(home / "raw" / "arm", periods=3)
     for name in ("slide", "push"):
         (study / f"{name}.csv").unlink()
@@ -136,6 +138,7 @@ def prepare(home: Path) -> None:
     own = (module.name for module in walk_packages(davinci_forces.__path__, "davinci_forces."))
     for name in (*LATER, *(name for name in own if not name.endswith("__main__"))):
         import_module(name)  # once, and not by every child
+    davinci_forces.run(study, quiet=True)  # here, so that every child has the compiled functions
     made = run(home, ["all", "raw/arm"])
     assert made["code"] == 0, made["said"]
 

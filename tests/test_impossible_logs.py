@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 
 import davinci_forces
 from davinci_forces.errors import BadLog
-from davinci_forces.identification import search
 from davinci_forces.records import Diagnostic, Recording
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.stages.recordings import resample
@@ -197,14 +196,6 @@ REMARKS = {
 def arms() -> list[tuple[bool, str]]:
     """Every log on an arm with limits and velocities or on one without them, by turns; the first ones on both."""
     return [(i % 2 == 0, name) for i, name in enumerate(LOGS)] + [(i % 2 == 1, name) for i, name in enumerate(FIRST)]
-
-
-@pytest.fixture
-def coarse_search(monkeypatch):
-    """The first, the middle and the last of each grid that a model is searched on, so that every extreme is tried."""
-    for name in ("CUTOFF_GRID", "LAG_GRID", "RIDGE_GRID", "DISPLACEMENT_GRID", "WIDTH_GRID", "DECAY_VELOCITY_GRID"):
-        grid = getattr(search, name)
-        monkeypatch.setattr(search, name, (grid[0], grid[len(grid) // 2], grid[-1]))
 
 
 @pytest.mark.usefixtures("coarse_search")

@@ -47,7 +47,7 @@ def results(folder: Path) -> dict[str, float]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("drawn_once")
+@pytest.mark.usefixtures("drawn_once", "coarse_search")
 def test_bags_of_a_study_s_recordings_give_its_results(tmp_path, monkeypatch):
     shorten(monkeypatch)  # what is designed depends on no log
     tables = simulated(tmp_path / "simulated")
