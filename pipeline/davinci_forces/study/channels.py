@@ -143,7 +143,9 @@ def tissue_channels(channels: Sequence[Channel]) -> dict[str, str]:
     for names in (TIP, FORCE):
         if not set(names) <= set(several):
             several = {quantity: named for quantity, named in several.items() if quantity not in names}
-    return {_best(named).name: quantity for quantity, named in several.items()}
+    # Of several channels of one quantity, the resultant, or the first.
+    best = {key: [c for c in of if set(RESULTANT_WORDS) & set(words_of(c))] or of for key, of in several.items()}
+    return {channels[0].name: quantity for quantity, channels in best.items()}
 
 
 def force_sensor(quantities: Mapping[str, str]) -> dict[str, str]:
@@ -176,8 +178,3 @@ def _quantity(words: list[str]) -> str:
     if axis and set(words) <= TIP_WORDS:
         return f"tip_{axis}"
     return next((quantity for quantity, telling in WORDS_BY_QUANTITY.items() if set(telling) & set(words)), "")
-
-
-def _best(channels: Sequence[Channel]) -> Channel:
-    """Of several channels of one quantity, the resultant, or the first."""
-    return next((channel for channel in channels if set(RESULTANT_WORDS) & set(words_of(channel))), channels[0])

@@ -21,6 +21,7 @@ from davinci_forces.report.verdicts import Trust, decisive, mass_level
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 RATINGS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
 F = ("f_x", "f_y", "f_z")  # components of the force at the tip
+UNFITTED = " that no fit used"  # the worst run is sought among these runs, if there are any
 PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 Window = tuple[str, float, float, float, str, int]  # log, onset, release, size of the peak, joint, and row
@@ -63,11 +64,6 @@ def section_of(
         return section
 
     return decorate
-
-
-def fit_condition(run: Any) -> str:
-    """What is added to the words "worst run", which is sought among the runs that no fit used, if there are any."""
-    return " that no fit used" if run.role != "identification" else ""
 
 
 def run_cells(run: Any) -> tuple[str, str]:

@@ -71,7 +71,8 @@ def figure(context: Context, p: Prediction) -> Figure:
     name, windows = parts.run_name(p), parts.spans(context.study.log(p.log).contact, "contact")
     error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.number(f"{p.prefix}.model_error", 2)
     fit = fit_name(p.model, p.estimator)
-    caption = parts.explanation("prediction-figure", run=name, unfitted=parts.fit_condition(p), fit=fit)
+    unfitted = parts.UNFITTED * (p.role != "identification")
+    caption = parts.explanation("prediction-figure", run=name, unfitted=unfitted, fit=fit)
     alt = f"{name}: the model error is {size}."
     panels = (
         parts.effort_panel(p, *windows),

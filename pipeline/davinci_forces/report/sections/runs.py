@@ -40,7 +40,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     yield from parts.paper_or_screen(scores(context, tracks))
     spaces = [space for joint in context.joints_of(tracks) if (space := context.worst_space(joint)) is not None]
     worst = [t for space in spaces for t in tracks if (t.log, t.joint) == (space.log, space.joint)]
-    traces = [trace(context, t, WORST + parts.fit_condition(t)) for t in worst]
+    traces = [trace(context, t, WORST + parts.UNFITTED * (t.role != "identification")) for t in worst]
     yield from parts.first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
     others = [t for t in tracks if t not in worst and not t.at_rest]
     if others:

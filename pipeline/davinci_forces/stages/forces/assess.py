@@ -7,15 +7,9 @@ import numpy as np
 from davinci_forces.filters.error_bands import joint_alarm_level
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import free_motion_statistics, typical_alarm_level
+from davinci_forces.maths.signals import windows
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import (
-    MIN_FREE_SAMPLES,
-    TRANSIENT,
-    free_smoothed,
-    free_space,
-    is_outside,
-    unbroken,
-)
+from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed, free_space, is_outside
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import Diagnostic, FreeSpace, Threshold, Track, by_name, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -90,7 +84,7 @@ def space_of(
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
     if track.role == "identification":
         highest = MAX_FITTED * typical_alarm_level(tau_ext, free, track.rate)
-        if len(unbroken(track.t[free & (np.abs(tau_ext) > highest)], TRANSIENT)) > MAX_TOUCHES:
+        if len(windows.unbroken(track.t[free & (np.abs(tau_ext) > highest)], windows.TRANSIENT)) > MAX_TOUCHES:
             highest = statistics.largest
         largest_stated = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
         statistics = statistics._replace(largest=max(min(statistics.largest, highest), largest_stated))

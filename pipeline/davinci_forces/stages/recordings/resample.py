@@ -54,7 +54,8 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     if not parts:
         why = f"no segment without a gap holds {MIN_SAMPLES_SEGMENT} of the {len(recording)} samples"
         raise BadLog(f"{recording.log}/{recording.joint}: {why}; record more, without gaps")
-    if all(is_even(recording.t[part], T_s) for part in parts):
+    steps = [step_of(recording.t[part]) for part in parts]
+    if all(are_apart(recording.t[part], step, EVEN * T_s / step) for part, step in zip(parts, steps, strict=True)):
         # The mean over the longest segment; a median would carry the rounding of the time stamps.
         T_s = step_of(max((recording.t[part] for part in parts), key=len))
         method, columns = "as recorded", [as_recorded(recording, part) for part in parts]
@@ -202,10 +203,9 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
         pairs = [(name, pair) for name, pair in zip(("q", "dq", "ddq"), wider, strict=True) if pair != ANYWHERE]
         stated = [f"{name} = [{low:.6g}, {high:.6g}]" for name, (low, high) in pairs]
         stated += [f"effort = {joint.limits.effort:.6g}"] * bool(np.isfinite(joint.limits.effort))
-        line = (
-            f"`limits = {{ {', '.join(stated)} }}` in [robot_overrides.{joint.name}] of study.toml or the robot's file"
-        )
-        remedy = f"correct the units, or {other}, or the limits, by which `excite` designs, if these are wrong: {line}"
+        line = f"`limits = {{ {', '.join(stated)} }}` in [robot_overrides.{joint.name}] of study.toml"
+        why = "or the limits, by which `excite` designs, if these are wrong"
+        remedy = f"correct the units, or {other}, {why}: {line} or the robot's file"
         text = f"{recording.log}/{recording.joint}: {', '.join(beyond)}; {remedy}"
         yield diagnostic("resample", f"{recording.log}.{recording.joint}.limits", severity, text)
 
@@ -233,11 +233,6 @@ def faults(recording: Recording) -> Iterator[str]:
             f"{name}: the effort is exactly at its largest or smallest value in {samples} samples: the drive or its "
             "sensor was saturated, so the true effort may be larger than the log says; record with less effort"
         )
-
-
-def is_even(t: Column, T_s: float) -> bool:
-    """Whether the clock of a segment is uniform to a fraction of a sampling time."""
-    return are_apart(t, step_of(t), EVEN * T_s / step_of(t))
 
 
 def step_of(t: Column) -> float:
