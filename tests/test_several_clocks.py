@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import davinci_forces
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import MIN_RATIO_FILTERED, Alignment, TimedBlock, align
-from davinci_forces.maths.signals.clock import GAP
+from davinci_forces.maths.signals.clock import GAP, MIN_INTERVALS_EVEN, are_gaps
 from tests import arm
 from tests.logs.test_clocks import said, tdms
 from tests.test_runs import call
@@ -321,3 +321,11 @@ def test_the_signals_of_a_real_arm_one_a_file_become_recordings(data: Path, tmp_
     t = touch["t"][:2000] + raw[1, 0]
     bend = np.abs(np.diff(theirs[:, 3], 2)).max()  # a cubic is no further from the chord than the samples bend
     assert_allclose(touch["force_z"][:2000], np.interp(t, theirs[:, 0], theirs[:, 3]), atol=bend / 4)
+
+
+def test_a_few_long_intervals_that_are_alike_are_gaps_however_late_they_come():
+    """Even stretches of a slower clock are none, and have many intervals."""
+    for slow, gaps in ((MIN_INTERVALS_EVEN - 2, True), (MIN_INTERVALS_EVEN + 2, False)):
+        steps = np.concatenate([np.full(300, 0.01), np.full(slow, 0.09), np.full(300, 0.01)])
+        found = are_gaps(np.cumsum(np.append(0.0, steps)), 0.01)
+        assert (found == (gaps & (steps > 0.05))).all()
