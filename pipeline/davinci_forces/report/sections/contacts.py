@@ -109,8 +109,8 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
         HBand(-level, level, "detection level" if named else ""),
         Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
     )
-    few = (0.0, len(peak) + 1.0) if len(peak) < 3 else None
-    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks, x_range=few)
+    heading, y_label, whole = title(contacts[0].joint), label(contacts[0], "peak", "effort"), (0.0, len(peak) + 1.0)
+    return Panel(heading, "window", y_label, marks, x_range=whole)
 
 
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:

@@ -24,18 +24,17 @@ TO_SIGN = "Reviewed by ______________________ on ______________   â˜ accept   â
 
 def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     """The verdict on the study by the rules of the table: efforts that stand out, and what limits the others."""
-    fine = [trusted for trusted in trusts if trusted.level == "good"]
     levels = [
         f"{context.number(f'threshold.{t.joint}.alarm_level', 2, std=None)} on {name_in_sentence(t.joint)}"
         + " (whose 95 % band is too narrow)" * t.narrow
-        for t in fine
-        if t.space is not None
+        for t in trusts
+        if t.space is not None and t.level != "bad"
     ]
     parts = (
         [f"the smallest effort that stands out from free motion (alarm level) is {as_list(levels)}"] if levels else []
     )
-    parts += errors([trusted for trusted in trusts if trusted not in fine and trusted.space is not None])
-    narrow = [t for t in trusts if t.narrow and t.level != "good"]  # `levels` names the good
+    parts += errors([trusted for trusted in trusts if trusted.level != "good" and trusted.space is not None])
+    narrow = [t for t in trusts if t.narrow and t.level == "bad"]  # `levels` names the others
     unseen = [t for t in trusts if t.space is None]
     for why, some in (("the 95 % band is too narrow", narrow), ("no effort was estimated in free space", unseen)):
         names = [name_in_sentence(t.joint).removeprefix("the " if i else "") for i, t in enumerate(some)]
