@@ -66,10 +66,10 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
     names = ("stream_delay", "free_rms", "stream_loss", "peak_ratio")
     rows = []
     for s in logs:
-        of_log, prefix = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}"
-        level = context.results[f"{prefix}.alarm_level"]
-        found = f"{int((abs(s.peak) > level.value).sum())} of {len(s)}" if len(s) else "–"
-        rows.append((*run_cells(s)[::-1], *of_log, level.number(2), found))
+        of_log, key = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}.alarm_level"
+        level = context.results.get(key)
+        found = f"{int((abs(s.peak) > level.value).sum())} of {len(s)}" if level and len(s) else "–"
+        rows.append((*run_cells(s)[::-1], *of_log, context.number(key, 2), found))
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(explanation("stream"), header, rows, "stream", "llrrrrrr")
 
