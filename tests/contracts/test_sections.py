@@ -1028,7 +1028,7 @@ def test_page_one_shows_the_log_with_the_largest_error_and_names_its_windows_onl
     panels = list(summary.effort_panel(about, trusted))
     assert panels[0].title == f"Hand roll, {worst}"
     assert [len(mark.x) for mark in panels[0].marks if isinstance(mark, Points)] == [1]
-    assert "contact windows shaded" in summary.caption(about, touched, panels)
+    assert "stated contact windows shaded" in summary.caption(about, touched, panels)
     logs = tuple(replace(log, contact=() if log.name == worst else log.contact) for log in lab.study.logs)
     panels = list(summary.effort_panel(replace(about, study=replace(lab.study, logs=logs)), trusted))
     assert worst not in panels[0].title  # an error that holds the pushes is none of the model

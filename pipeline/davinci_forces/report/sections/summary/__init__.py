@@ -99,7 +99,7 @@ def caption(context: Context, contacts: list[Contact], panels: list[Panel]) -> s
     which += f"{as_list(elsewhere)}: in no contact log, so the worst run in free space is shown. " * bool(elsewhere)
     where = f" in {literal(one_log(panels))}" if one_log(panels) else ""
     is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
-    shaded = ", contact windows shaded" if is_shaded else ""
+    shaded = ", stated contact windows shaded" if is_shaded else ""
     has_dots = any(isinstance(mark, Points) for panel in panels for mark in panel.marks)
     dots = " Dots: peaks, beyond the curve by what smoothing takes off them." * has_dots
     return f"External effort of each joint{where}{shaded}. {which}{level}{dots}"
