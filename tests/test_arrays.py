@@ -93,6 +93,13 @@ def test_the_external_effort_and_its_contacts_are_those_of_a_study_on_the_same_a
     assert_equal_numbers(effort.contact_record[0], contact)
     assert effort.contacts["joint"].tolist() == [JOINT] * len(contact)
     assert_allclose(effort.contacts["peak"], contact.peak, rtol=1e-12)
+    assert not effort.contacts["small"].any()
+    weak = replace(contact, peak=1.5 * contact.alarm_level * np.sign(contact.peak), stated=0 * contact.stated)
+    for above in (0, 1):
+        of = replace(effort, contact_record=(contact, replace(weak, above=np.full(len(weak), above))))
+        assert of.contacts["small"].tolist() == [False] * len(contact) + [True] * len(weak)
+        assert f"{len(contact) + above * len(weak)} contacts of joints" in repr(of)
+        assert "middle_mean" in repr(of)
 
 
 def test_the_predicted_effort_is_that_of_a_study_and_needs_no_effort(folder, identified):
@@ -133,7 +140,7 @@ def test_the_log_of_an_external_effort_is_saved_with_its_windows(identified, tmp
     with np.load(folder / log.files[0]) as saved:
         assert_allclose(saved[f"{JOINT}.tau"], PUSHED.tau)
         assert_allclose(saved["time"], PUSHED.t)
-    assert f"{JOINT}, {len(effort.t)} samples, {len(effort.contacts)} contacts" in repr(effort)
+    assert f"{JOINT}, {len(effort.t)} samples, {int(effort.contacts['above'].sum())} contacts" in repr(effort)
     free = identified.external_effort(FIRST.t, FIRST.q, FIRST.tau, dq=FIRST.dq, free=[[0, 1000]])
     assert reading.read(identified.save(tmp_path / "free", calm=free)).log("calm").role == "validation"
     with pytest.raises(BadRequest, match="identification-1 is the name of an identified log"):

@@ -34,7 +34,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
-from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO, band, percent
+from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO, band, is_small, percent
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
@@ -384,11 +384,12 @@ class ExternalEffort:
     def contacts(self) -> pd.DataFrame:
         """Contacts, stated or detected: onset, release [s], peak, `middle_mean` (the level if held), mean, impulse.
 
-        In a stated window in which nothing was detected, `above` is 0.
+        In a stated window in which nothing was detected, `above` is 0.  One that is `small`, not stated and below twice
+        the alarm level, may be an error of the model.
         """
-        names = [name for name in Contact.columns() if name not in ("stated", "found")]
-        frames = [as_frame(contact)[["joint", *names]] for contact in self.contact_record]
-        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["joint", *names])
+        names = ["joint", *(name for name in Contact.columns() if name not in ("stated", "found"))]
+        frames = [as_frame(contact)[names].assign(small=is_small(contact)) for contact in self.contact_record]
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names, "small"])
 
     def plot(self) -> Any:
         """Plot the external effort with its 95 % band and the contacts; returns the axes, one a joint."""
@@ -403,9 +404,10 @@ class ExternalEffort:
 
     def __repr__(self) -> str:
         """The contacts as a table."""
-        contacts = self.contacts[["joint", "onset", "release", "peak", "peak_std"]]
+        found = self.contacts[self.contacts["above"] == 1]
+        contacts = found[["joint", "onset", "release", "peak", "peak_std", "middle_mean", "small"]]
         joints = ", ".join(track.joint for track in self.record)
-        return f"{joints}, {len(self.t)} samples, {len(contacts)} contacts\n{contacts}"
+        return f"{joints}, {len(self.t)} samples, {len(contacts)} contacts of joints\n{contacts}"
 
     def _repr_html_(self) -> str:
         return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)
