@@ -84,6 +84,9 @@ from davinci_forces.report.sections import (
     baseline as baseline_section,
 )
 from davinci_forces.report.sections import (
+    choice as choice_section,
+)
+from davinci_forces.report.sections import (
     contacts as contacts_section,
 )
 from davinci_forces.report.sections import (
@@ -1376,6 +1379,13 @@ def test_the_worst_run_of_a_figure_is_said_to_be_of_those_that_no_fit_used(full:
     assert all("that no fit used" in caption for caption in captions(full))
     assert captions(fitted)
     assert not any("that no fit used" in caption for caption in captions(fitted))
+
+
+def test_the_best_candidate_of_a_kind_is_shown_beside_the_chosen_one(full: Context):
+    [of, *_] = full.catalogue.records(Choice)
+    chosen, variant = of.row_number(of.chosen), np.full(len(of), "searched", object)
+    worst = replace(of, variant=variant, score=np.where(np.arange(len(of)) == chosen, of.score.max() + 1.0, of.score))
+    assert choice_section.best_rows(worst) == [int(np.argmin(worst.score)), chosen]
 
 
 def test_the_choice_names_the_model_in_use_where_another_took_the_place_of_the_chosen_one(full: Context):

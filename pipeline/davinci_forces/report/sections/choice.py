@@ -65,9 +65,7 @@ def best_rows(choice: Choice) -> list[int]:
     best: dict[str, int] = {}
     for i in np.argsort(choice.score, kind="stable").tolist():
         best.setdefault(str(choice.variant[i]), i)
-    chosen = choice.row_number(choice.chosen)
-    best[str(choice.variant[chosen])] = chosen
-    return sorted(best.values(), key=lambda i: float(choice.score[i]))
+    return sorted({*best.values(), choice.row_number(choice.chosen)}, key=lambda i: float(choice.score[i]))
 
 
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
