@@ -94,6 +94,7 @@ def test_the_external_effort_and_its_contacts_are_those_of_a_study_on_the_same_a
     assert effort.contacts["joint"].tolist() == [JOINT] * len(contact)
     assert_allclose(effort.contacts["peak"], contact.peak, rtol=1e-12)
     assert not effort.contacts["small"].any()
+    assert effort.contacts["alarm_level"].unique().tolist() == [contact.alarm_level]
     weak = replace(contact, peak=1.5 * contact.alarm_level * np.sign(contact.peak), stated=0 * contact.stated)
     for above in (0, 1):
         of = replace(effort, contact_record=(contact, replace(weak, above=np.full(len(weak), above))))
@@ -330,7 +331,8 @@ def test_motion_beyond_what_was_fitted_and_a_narrow_band_are_doubted():
     assert arrays.doubts(records.__getitem__) == [
         "new/hand_roll: it moves 1.6 times as fast as in any fitted log",
         "new/hand_roll: 25 % of its samples are beyond all fitted positions",
-        "validation/hand_roll: the 95 % band is too narrow: it covers only 85 % of free motion",
+        "validation/hand_roll: the 95 % band is too narrow: it covers only 85 % of free motion; "
+        "judge by the alarm level",
     ]
 
 

@@ -387,7 +387,7 @@ class ExternalEffort:
         In a stated window in which nothing was detected, `above` is 0.  One that is `small`, not stated and below twice
         the alarm level, may be an error of the model.
         """
-        names = ["joint", *(name for name in Contact.columns() if name not in ("stated", "found"))]
+        names = ["joint", "alarm_level", *(name for name in Contact.columns() if name not in ("stated", "found"))]
         frames = [as_frame(contact)[names].assign(small=is_small(contact)) for contact in self.contact_record]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names, "small"])
 
@@ -447,7 +447,7 @@ def doubts(reading: Any) -> list[str]:
     spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
     return texts + [
-        f"{x.log}/{x.joint}: {narrow} {percent(x.coverage)} of free motion"
+        f"{x.log}/{x.joint}: {narrow} {percent(x.coverage)} of free motion; judge by the alarm level"
         for x in spaces if band(x.coverage) == "bad"
     ]  # fmt: skip
 
