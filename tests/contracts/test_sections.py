@@ -526,7 +526,7 @@ def test_the_paragraph_for_a_paper_names_filter_and_smoother_the_data_and_each_j
     text = paragraph(full)
     assert "an extended Kalman filter" in text
     assert "and then a fixed-interval smoother (Bierman, 1973) without delay" in text
-    assert "estimated from motor efforts and joint positions" in text
+    assert "which it exerts on its environment, were estimated from motor efforts and joint positions" in text
     fits = {joint.name: full.shown_fit(joint.name) for joint in full.study.robot.joints}
     assert not any(fit.periods for fit in fits.values())  # the chosen model is not fitted to averages
     logs = {log for fit in fits.values() for log in fit.logs}
