@@ -1137,7 +1137,9 @@ def test_page_one_says_which_panels_show_no_contact_log_and_where_dots_stand(ful
     assert "in no contact log" not in summary.caption(full, contacts, panels[:1])
     assert "Dots" not in told
     told = summary.caption(full, contacts, [replace(panels[0], marks=(dot,))])
-    assert told.endswith(" Dots: peaks, beyond the curve by what smoothing takes off them.")
+    assert told.endswith(
+        " Dots: peaks, that of a plateau at its end, beyond the curve by what smoothing takes off them."
+    )
 
 
 def test_a_found_contact_is_outside_windows_only_where_some_are_stated(full: Context):
