@@ -330,7 +330,7 @@ def test_motion_beyond_what_was_fitted_and_a_narrow_band_are_doubted():
     records = {PathShare: [share, usual, fitted], FreeSpace: [space, wide, filtered]}
     assert arrays.doubts(records.__getitem__) == [
         "new/hand_roll: it moves 1.6 times as fast as in any fitted log",
-        "new/hand_roll: 25 % of its samples are beyond all fitted positions",
+        "new/hand_roll: 25 % of its samples are beyond all fitted positions by more than 5 % of their range",
         "validation/hand_roll: the 95 % band is too narrow: it covers only 85 % of free motion; "
         "judge by the alarm level",
     ]

@@ -34,7 +34,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
-from davinci_forces.report.verdicts import MAX_OUTSIDE, MAX_SPEED_RATIO, band, is_small, percent
+from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, is_small, percent
 from davinci_forces.robots import Robot
 from davinci_forces.runner.console import Console, table
 from davinci_forces.runner.results.dataframes import as_frame
@@ -443,7 +443,7 @@ def doubts(reading: Any) -> list[str]:
         if x.speed_ratio > MAX_SPEED_RATIO:
             texts.append(f"{x.log}/{x.joint}: it moves {x.speed_ratio:.2g} times as fast as in any fitted log")
         if x.outside > MAX_OUTSIDE:
-            texts.append(f"{x.log}/{x.joint}: {percent(x.outside)} of its samples are beyond all fitted positions")
+            texts.append(f"{x.log}/{x.joint}: {percent(x.outside)} of its samples are {BEYOND}")
     spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
     return texts + [

@@ -240,7 +240,7 @@ def test_of_motions_faster_or_farther_than_all_fitted_ones_the_most_extreme_is_t
     known = {"slow": (1.45, 0.05), "unknown": (np.nan, np.nan), "fast": (1.6, 0.0), "most": (3.1, 0.23)}
     shares = [replace(path_share(log), speed_ratio=ratio, outside=out) for log, (ratio, out) in known.items()]
     fastest = "**Roll, most**: it moves 3.1 times as fast as in any fitted log"
-    farthest = "**Roll, most**: 23 % of its samples are beyond all fitted positions"
+    farthest = "**Roll, most**: 23 % of its samples are beyond all fitted positions by more than 5 % of their range"
     for count, expected in ((2, []), (4, [fastest, farthest])):
         context = SimpleNamespace(catalogue=Catalogue(lambda kind, n=count: shares[:n] if kind is PathShare else []))
         looks = [text.partition(", so ")[0] for _, text in caveats.looks_at_reach(context, ["roll"])]

@@ -30,6 +30,7 @@ MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the medi
 MIN_NEW_PATH = 0.0975
 MAX_SPEED_RATIO = 1.5  # speed of a log over that of the fastest fitted one; the model extrapolates above it
 MAX_OUTSIDE = 0.1  # share of samples beyond all fitted positions, above which page one says so
+BEYOND = "beyond all fitted positions by more than 5 % of their range"  # OUTSIDE_MARGIN
 MIN_MOVING = 0.5  # share of a run in motion; at rest, friction takes any value, and the run says nothing of the model
 SMALL = 2.0  # of the alarm level: peaks of contacts below it may be errors of the model
 COVERED = (MIN_COVERAGE, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide

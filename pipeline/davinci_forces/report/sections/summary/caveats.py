@@ -99,13 +99,13 @@ def looks_at_reach(context: Context, joints: list[str]) -> Iterator[tuple[float,
     """Yield a caveat for the joint and log that are fastest over fitted logs, and for those that go farthest beyond."""
     shares = [share for share in context.catalogue.records(PathShare) if share.joint in joints]
     reaches = (
-        ("speed_ratio", verdicts.MAX_SPEED_RATIO, "it moves {:.2g} times as fast as in any fitted log", "is as fast"),
-        ("outside", verdicts.MAX_OUTSIDE, "{:.0%} of its samples are beyond all fitted positions", "goes as far"),
+        ("speed_ratio", verdicts.MAX_SPEED_RATIO, "it moves {0:.2g} times as fast as in any fitted log", "is as fast"),
+        ("outside", verdicts.MAX_OUTSIDE, "{1} of its samples are " + verdicts.BEYOND, "goes as far"),
     )
     for name, most, text, remedy in reaches:
         share = max(shares, key=lambda of: np.nan_to_num(getattr(of, name)), default=None)
         if share is not None and (reach := getattr(share, name)) > most:
-            where, what = f"**{title(share.joint)}, {literal(share.log)}**", text.format(reach).replace("%", " %")
+            where, what = f"**{title(share.joint)}, {literal(share.log)}**", text.format(reach, percent(reach))
             follows = f"so its model extrapolates and may err more. Record an identification log that {remedy}."
             yield reach / most, f"{where}: {what}, {follows}"
 
