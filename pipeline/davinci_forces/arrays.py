@@ -404,8 +404,8 @@ class ExternalEffort:
 
     def __repr__(self) -> str:
         """The contacts as a table."""
-        found = self.contacts[self.contacts["above"] == 1]
-        contacts = found[["joint", "onset", "release", "peak", "peak_std", "middle_mean", "small"]]
+        above = self.contacts[self.contacts["above"] == 1]
+        contacts = above[["joint", "onset", "release", "peak", "peak_std", "middle_mean", "small"]]
         joints = ", ".join(track.joint for track in self.record)
         return f"{joints}, {len(self.t)} samples, {len(contacts)} contacts of joints\n{contacts}"
 

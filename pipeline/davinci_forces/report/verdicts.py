@@ -280,7 +280,7 @@ def percent(share: float) -> str:
 
 def is_hidden(error: float, std: float | None) -> bool:
     """Whether a model error, the root of a difference that is at least 0, would be printed as 0.00 ± 0.12."""
-    return bool(std) and error <= NO_ERROR * (std or 0.0)
+    return std is not None and std > 0.0 and error <= NO_ERROR * std
 
 
 def error_share(p: Prediction | None) -> str:

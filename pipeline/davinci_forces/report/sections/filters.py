@@ -68,8 +68,8 @@ def stream_table(context: Context, logs: list[Streamed]) -> Table:
     for s in logs:
         of_log, key = context.numbers(f"stream.{s.log}.{s.joint}", names, 2), f"stream.{s.joint}.alarm_level"
         level = context.results.get(key)
-        found = f"{int((abs(s.peak) > level.value).sum())} of {len(s)}" if level and len(s) else "–"
-        rows.append((*run_cells(s)[::-1], *of_log, context.number(key, 2), found))
+        detected = f"{int((abs(s.peak) > level.value).sum())} of {len(s)}" if level and len(s) else "–"
+        rows.append((*run_cells(s)[::-1], *of_log, context.number(key, 2), detected))
     header = ("Joint", "Log", "Delay", "RMS", "Over smoother", "Peaks", "Alarm level", "Contacts found")
     return Table(explanation("stream"), header, rows, "stream", "llrrrrrr")
 

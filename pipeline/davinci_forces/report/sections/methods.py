@@ -13,6 +13,7 @@ from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import as_list
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context, count
+from davinci_forces.report.sections import parts
 from davinci_forces.report.sections.parts import chapters, explanation, grade_of_mass, of_joint, section_of, trust
 from davinci_forces.report.verdicts import error_share, thresholds
 
@@ -91,7 +92,7 @@ def paragraph_for_paper(context: Context) -> str:
         together="".join(together).replace("_", " "),
         lowpass=f"{settings.lowpass:g}",
         walk=f"of intensity {settings.q_tau:g} effort/s^0.5" if settings.q_tau else f"({slowest})",
-        unfitted=" that no fit used" if unfitted else " (of those that no fit used, if there are any)",
+        unfitted=parts.UNFITTED if unfitted else " (of those that no fit used, if there are any)",
         masses=f" Of known masses, {as_list(masses)}." if masses else "",
     )
     return fill(paragraph, 88, break_on_hyphens=False)

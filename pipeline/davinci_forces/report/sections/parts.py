@@ -194,8 +194,8 @@ def of_joint(fit: Fit, joint: str) -> dict[int, str]:
 def contacts_at_once(contacts: Iterable[Contact], which: Callable[[Contact], Booleans]) -> list[list[Window]]:
     """Group some of the contacts (C,): those whose windows overlap in a log."""
     groups: list[list[Window]] = []
-    found = [(c, i) for c in contacts for i in np.flatnonzero(which(c)).tolist()]
-    for window in sorted((c.log, c.onset[i], c.release[i], abs(c.peak[i]), c.joint, i) for c, i in found):
+    rows = [(c, i) for c in contacts for i in np.flatnonzero(which(c)).tolist()]
+    for window in sorted((c.log, c.onset[i], c.release[i], abs(c.peak[i]), c.joint, i) for c, i in rows):
         if not groups or window[0] != groups[-1][0][0] or window[1] >= max(end for _, _, end, *_ in groups[-1]):
             groups.append([])
         groups[-1].append(window)
