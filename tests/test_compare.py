@@ -123,10 +123,10 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     a, b = results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after)
     first, roll, slide, other = call("compare", a, b).split("\n\n")[:4]
     assert first.endswith(
-        "changed: 2 of page one, 12 of model, 1 of contacts, 2 of forces, 1 of noise, 5 of candidates"
+        "changed: 2 of verdicts, 12 of model, 1 of contacts, 2 of forces, 1 of noise, 5 of candidates"
     )
     listed = [line.strip().split("  ")[:2] for line in roll.splitlines()[2:-1]]
-    assert [row[0] for row in listed] == ["page one"] * 2 + ["contacts"] + ["model"] * 7
+    assert [row[0] for row in listed] == ["verdicts"] * 2 + ["contacts"] + ["model"] * 7
     assert "fit.roll.chosen.lse.p11" in roll.splitlines()[5]
     assert roll.splitlines()[-1] == "  and 5 of model, 1 of forces, 1 of noise, 4 of candidates: --all lists them"
     every = call("compare", a, b, "--all").split("\n\n")[1].splitlines()

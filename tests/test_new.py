@@ -18,6 +18,7 @@ from davinci_forces.robots.robot import Kind
 from davinci_forces.study import reading
 from davinci_forces.study.holding import Holding
 from davinci_forces.study.joint_names import by_joint_names
+from davinci_forces.study.names import words_of
 from davinci_forces.study.roles import GUESSED, WIDER, Evidence, roles_of
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.simulation.six_joints import write
@@ -321,6 +322,29 @@ def test_where_each_file_has_one_joint_its_name_tells_which(tmp_path, files, joi
             f"{joint}.{'dtheta' if at_motor else 'dq'}{at_motor}": "Velocity (rad/s)", f"{joint}.i": "Current (A)",
         }  # fmt: skip
     assert "CHECK" not in said.replace(GUESSED, "")
+
+
+@pytest.mark.parametrize("robot", ["", "davinci"])
+def test_words_in_one_and_sides_that_only_some_channels_name_are_read(tmp_path, robot):
+    """`Motorwinkel` is an angle of the motor, and no name says whether a current is; letters tell the joints."""
+    t, q, dq = motion(3)
+    kinds = (("Motorwinkel (rad)", 30 * q), ("Motordrehzahl (rad/s)", 30 * dq), ("Strom (mA)", effort(q, dq)))
+    columns = {f"Achse {'ABC'[k]} {name}": block[:, k].tolist() for k in range(3) for name, block in kinds}
+    columns |= {f"Achse {'ABC'[k]} Sollwinkel (rad)": (30 * q[:, k]).tolist() for k in range(3)}
+    (tmp_path / "messung.lvm").write_bytes(lvm([Write(columns, x=t.tolist())]))
+    new(tmp_path, *(["--robot", robot] if robot else []))
+    joints = [joint.name for joint in davinci.ROBOT.joints] if robot else ["achse_a", "achse_b", "achse_c"]
+    symbols = zip(("theta_m", "dtheta_m", "i"), (name for name, _ in kinds), strict=True)
+    channels = {f"{j}.{s}": f"Achse {'ABC'[k]} {n}" for s, n in symbols for k, j in enumerate(joints)}
+    assert held(tmp_path) == {"time": "X_Value", **channels}
+    in_order = "CHECK: which joint it is: taken in order; joint 'achse_"
+    assert (tmp_path / "study.toml").read_text().count(in_order) == 9 * bool(robot)
+
+
+def test_a_prefix_with_a_word_that_is_too_short_to_be_meant_is_no_quantity():
+    assert (words_of("Sollposition"), words_of("Motori"), words_of("Istwert")) == (
+        ["soll", "position"], ["motori"], ["istwert"],
+    )  # fmt: skip
 
 
 def test_pushes_that_names_tell_are_no_joint_whatever_their_values_say(tmp_path):

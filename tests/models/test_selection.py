@@ -178,7 +178,10 @@ def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse
     results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(fitted=(np.full((6, 1), 0.01**2 / 6),))]
     assert standard_error(results[1], results[0]) > 0.001
     named = [SimpleNamespace(name="small", size=3), SimpleNamespace(name="large", size=9)]
-    assert ("overfits" in reason(named, results, 0, 0, [True, True])) == overfits
+    said, error = reason(named, results, 0, 0, [True, True]), standard_error(results[1], results[0])
+    assert ("overfits" in said) == overfits
+    by_how_much = f"(0.3000, more by {score - 0.1:.4f}, with a standard error of {error:.4f}): it overfits"
+    assert (by_how_much in said) == overfits
 
 
 @pytest.mark.parametrize(("difference", "overfits"), [(0.9e-4, False), (1.1e-4, True)])

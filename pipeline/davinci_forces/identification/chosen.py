@@ -153,11 +153,12 @@ def reason(
         )
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))
-    excess, gain = results[closest].score - results[i].score, training[i] - training[closest]
-    if gain > LAST_DIGIT and excess > max(LAST_DIGIT, standard_error(results[closest], results[i])):
+    (excess, error), gain = by_more(results[closest], results[i]), training[i] - training[closest]
+    if gain > LAST_DIGIT and excess > max(LAST_DIGIT, error):
         text += (
             f"; {candidates[closest].name} fits better ({training[closest]:.4f} instead of {training[i]:.4f}) and "
-            f"predicts worse ({results[closest].score:.4f}): it overfits"
+            f"predicts worse ({results[closest].score:.4f}, more by {excess:.4f}, with a standard error of "
+            f"{error:.4f}): it overfits"
         )
     return text
 

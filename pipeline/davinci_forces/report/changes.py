@@ -11,10 +11,10 @@ SUBJECTS = {  # what a key is about, by its first part; other keys are of the st
                "stability", "haptics"),
     "noise": ("noise", "whiteness", "band", "period", "log"),
 }  # fmt: skip
-PAGE_ONE = ("model_error", "detection_level", "coverage")  # last parts of its keys
+OF_VERDICTS = ("model_error", "detection_level", "coverage")  # last parts of the keys that verdicts are made of
 OF_CANDIDATES = ("fit", "choice", "cv", "predict", "search", "guess", "identifiability", "correlation")
 RANKS = {  # to sort by
-    "page one": 0, "model": 1, "contacts": 1, "forces": 2, "study": 2, "noise": 3,
+    "verdicts": 0, "model": 1, "contacts": 1, "forces": 2, "study": 2, "noise": 3,
     "standard errors": 4, "candidates": 5,
 }  # fmt: skip
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
@@ -70,8 +70,8 @@ class Change:
         is_chosen = "chosen" in others
         if start in OF_CANDIDATES and not is_chosen:
             return "candidates"
-        if others[-1:] and others[-1] in PAGE_ONE and (is_chosen or start == "effort"):
-            return "page one"
+        if others[-1:] and others[-1] in OF_VERDICTS and (is_chosen or start == "effort"):
+            return "verdicts"
         if others and (others[-1].startswith("std_") or others[-1].endswith("_std")):
             return "standard errors"
         start = start.partition("-")[0]  # ekf-euler is an ekf

@@ -89,7 +89,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
     channels = [channel.alias or channel.name for draft in drawn for channel in draft.log.channels]
     names = [folder.resolve().name, *(file.name for file in files), *channels]
     arm = stated[0] if stated else belonging.arm_of([draft.guess for draft in drawn], folder, names, arms, why_not)
-    drawn = _named_as(arm.robot, drawn)
+    drawn = _named_as(arm, drawn)
     named = [*_distinct(drawn)]
     roles = roles_of([_evidence(draft, name, folder, arm.robot) for draft, name in named])
     blocks, rows = [], []
@@ -147,14 +147,16 @@ def _distinct(drawn: Sequence[DraftLog]) -> Iterator[tuple[DraftLog, str]]:
         yield draft, name
 
 
-def _named_as(robot: Robot, drawn: Sequence[DraftLog]) -> list[DraftLog]:
-    """Assign channels to the robot's joints of the same names as their labels, in whatever order the log has them."""
-    joints = {joint.name: k for k, joint in enumerate(robot.joints)}
-    return [
-        replace(draft, guess=draft.guess.with_joints([joints[label] for label in draft.guess.labels]))
-        if draft.guess.labels and set(draft.guess.labels) <= joints.keys() else draft
-        for draft in drawn
-    ]  # fmt: skip
+def _named_as(arm: Arm, drawn: Sequence[DraftLog]) -> list[DraftLog]:
+    """Assign channels to the robot's joints of the same names as their labels, else in the order of the log."""
+    joints = {joint.name: k for k, joint in enumerate(arm.robot.joints)}
+
+    def holding_of(guess: Holding) -> Holding:
+        if guess.labels and set(guess.labels) <= joints.keys():
+            return guess.with_joints([joints[label] for label in guess.labels])
+        return guess.to_check("which joint it is: taken in order") if any(guess.labels) and not arm.text else guess
+
+    return [replace(draft, guess=holding_of(draft.guess)) for draft in drawn]
 
 
 def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:

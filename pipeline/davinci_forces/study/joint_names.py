@@ -112,7 +112,7 @@ def by_words(channels: Sequence[Channel]) -> Holding:
     for channel in channels:
         words = names.words_of(names.without_unit(channel.name))
         if not names.is_time(channel) and (symbol := names.symbol_of(words)):
-            label = "_".join(word for word in words if word not in names.SIGNAL_WORDS[symbol])
+            label = "_".join(word for word in words if word not in ("motor", *names.SIGNAL_WORDS[symbol]))
             named.setdefault(symbol, {}).setdefault(label, channel.name)
     labels = [*named.get("q", ())]
     alike = any(set(named.get(effort, ())) == set(labels) for effort in ("tau", "i"))
@@ -120,7 +120,10 @@ def by_words(channels: Sequence[Channel]) -> Holding:
     if len(labels) < 2 or not alike or in_labels & names.PROCESSED_WORDS:
         return Holding()
     meanings = {
-        name: Meaning(symbol, labels.index(label), f"joint {label!r}")
+        name: Meaning(
+            AT_MOTOR.get(symbol, symbol) if "motor" in names.words_of(name) else symbol,
+            labels.index(label), f"joint {label!r}",
+        )
         for symbol, by_label in named.items() for label, name in by_label.items() if label in labels
     }  # fmt: skip
     return Holding(with_one_effort(meanings), len(labels), tuple(labels))

@@ -15,6 +15,8 @@ SIGNAL_WORDS: dict[str, list[str]] = WORDS["signal"]
 FORCE_WORDS, COMMAND_WORDS, OTHER_WORDS, ROUGH_WORDS, TIME_WORDS, TIME_QUALIFIERS, IN_DEGREES = (
     frozenset[str](WORDS[name]) for name in ("force", "command", "other", "rough", "time", "time_qualifier", "degrees")
 )
+SECOND = "|".join(word for words in SIGNAL_WORDS.values() for word in words if len(word) > 2)
+COMPOUND = re.compile(rf"\b({'|'.join(WORDS['prefix'])})({SECOND})\b", re.IGNORECASE)
 PROCESSED_WORDS = ROUGH_WORDS.union(WORDS["processed"])
 PARTS = re.compile(f"([/.]){OUTSIDE}")  # not the slash of `speed (rad/s)`
 WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
@@ -33,8 +35,8 @@ class Numbered:
 
 
 def words_of(name: str) -> list[str]:
-    """The words and numbers of a name, in lower case: `measuredJointPosition`, `actual_qd_0`."""
-    return [word.lower() for word in WORD.findall(name)]
+    """The words and numbers of a name, in lower case: `measuredJointPosition`, `actual_qd_0`, `Motorwinkel`."""
+    return [word.lower() for word in WORD.findall(COMPOUND.sub(r"\1 \2", name))]
 
 
 def without_unit(name: str) -> str:
