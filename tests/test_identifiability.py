@@ -13,6 +13,7 @@ from davinci_forces.identification.identifiability import (
     advice,
     describe_correlated,
     describe_insignificant,
+    excite_command,
     hardly_described,
     moving_with,
     why_not_positive,
@@ -29,12 +30,23 @@ from davinci_forces.records import Diagnostic, Identifiability, Spectrum
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import unidentified_parameters
 from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.stages.model import fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
 from tests.test_estimation import trajectory
 
 ROLL = arm.joint("hand_roll")
+
+
+def test_a_command_that_needs_limits_says_so_where_a_robot_s_file_states_none():
+    joint = ROBOT.joints[0]
+    first_unlimited = (replace(joint, limits=UNLIMITED), *ROBOT.joints[1:])
+    filed = replace(ROBOT, file="my.toml", joints=first_unlimited)
+    lacking = " in the study's folder (once my.toml states limits of q and dq)"
+    for name, more in ((joint.name, lacking), ("all", lacking), (ROBOT.joints[1].name, " in the study's folder")):
+        assert excite_command(filed, name) == f"`davinci-forces excite my.toml {name}`{more}"
+    assert excite_command(ROBOT, "all") == "`davinci-forces excite davinci all`"
 
 
 def of(Phi: np.ndarray):

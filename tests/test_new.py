@@ -427,7 +427,9 @@ def test_the_robot_that_more_joints_may_be_of_is_named_where_their_number_and_ra
     scale[2] *= range_3
     header = ",".join(["t", *(f"{symbol}{k}" for symbol in ("q", "dq", quantity) for k in range(joints))])
     file = table(tmp_path / "run.csv", t, q * scale, dq * scale, effort(q, dq), header=header)
-    assert f"robot.toml: written for the {joints} joints of the logs, as " in new(file)
+    said = new(file)
+    assert f"robot.toml: written for the {joints} joints of the logs, as " in said
+    assert "no joint's motion loads another: `davinci-forces guide robot-file` adds links" in said
     [robot] = re.findall("^robot = .*", (tmp_path / "study.toml").read_text(), re.M)
     assert robot.startswith('robot = "robot.toml"')
     assert robot.endswith(hint)

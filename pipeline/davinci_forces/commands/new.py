@@ -33,6 +33,8 @@ def run(
     if draft.arm.text:
         write_bytes(folder / draft.arm.name, draft.arm.text.encode())
         echo(f"{folder / draft.arm.name}: {draft.arm.reason}; check the kinds of its joints and their terms")
+        if len(draft.arm.robot.joints) > 1:
+            echo("in it no joint's motion loads another: `davinci-forces guide robot-file` adds links")
     write_bytes(target, draft.text.encode())
     echo("\n".join(table([("file", "role", "rate", "joints", "look at"), *draft.rows])))
     if all(row.role in ("left out", "-") for row in draft.rows):

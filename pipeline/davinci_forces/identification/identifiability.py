@@ -9,7 +9,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import least_squares
 from davinci_forces.records.record import join_names
 from davinci_forces.robots import ROBOTS
-from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.robots.robot import ANYWHERE, Joint, Robot
 
 MIN_CORRELATION = 0.95  # two parameters are reported as correlated from this correlation on
 MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than the best one is reported
@@ -56,10 +56,12 @@ def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
 
 
 def excite_command(robot: Robot, joint: str) -> str:
-    """Return the command that designs a motion of a joint, or of `all`, and where to run it if the robot is a file."""
+    """Return the command that designs a motion of a joint, or of `all`, and where and when a robot's file allows it."""
     listed = robot.name in ROBOTS and not robot.file
     name = robot.name if listed else robot.file or f"{robot.name}.toml"
-    return f"`davinci-forces excite {name} {joint}`" + ("" if listed else " in the study's folder")
+    limits = [j.limits for j in robot.joints if joint in (j.name, "all")]
+    lacking = f" (once {name} states limits of q and dq)" * any(ANYWHERE in (limit.q, limit.dq) for limit in limits)
+    return f"`davinci-forces excite {name} {joint}`" + ("" if listed else f" in the study's folder{lacking}")
 
 
 def why_not_positive(

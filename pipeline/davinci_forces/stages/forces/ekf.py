@@ -126,6 +126,6 @@ def drift_warning(model: JointModel, offset: DayOffset, unit: str) -> Diagnostic
     message = (
         f"{model.log}/{model.joint}: the offset drifts within the free windows by {offset.drift:.3g} {unit}, with a "
         f"standard error of {offset.drift_std:.2g} {unit}, so efforts between them are uncertain by as much; shorten "
-        "the log, or state a free window nearer to the contact, or after it, too"
+        "the log, or state free windows nearer to where efforts matter, before and after"
     )
     return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)
