@@ -213,17 +213,10 @@ def run_stages(study: Path, names: tuple[str, ...], *options: Any) -> bool:
 @app.command(STAGE)
 @errors_as_messages()
 def run_named(
-    context: typer.Context,
-    study: StudyFolder,
-    processed: Processed = None,
-    reports: Reports = None,
-    force: Force = False,
-    jobs: Jobs = 1,
-    cluster: Cluster = "",
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    context: typer.Context, study: StudyFolder, processed: Processed = None, reports: Reports = None,
+    force: Force = False, jobs: Jobs = 1, cluster: Cluster = "", quiet: Quiet = False, verbose: Verbose = False,
     dry_run: DryRun = False,
-) -> None:
+) -> None:  # fmt: skip
     """Run the stage or group that the command is named after, and the stages it needs."""
     from davinci_forces.runner import runs
 
@@ -236,16 +229,9 @@ def run_named(
 @app.command("all", rich_help_panel=FIRST_PANEL)
 @errors_as_messages()
 def run_all(
-    studies: Studies = None,
-    processed: Processed = None,
-    reports: Reports = None,
-    force: Force = False,
-    jobs: Jobs = 1,
-    cluster: Cluster = "",
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    dry_run: DryRun = False,
-) -> None:
+    studies: Studies = None, processed: Processed = None, reports: Reports = None, force: Force = False,
+    jobs: Jobs = 1, cluster: Cluster = "", quiet: Quiet = False, verbose: Verbose = False, dry_run: DryRun = False,
+) -> None:  # fmt: skip
     """Run all stages and write the report, for the named studies or for every study in raw/ whose logs exist."""
     from davinci_forces.runner import runs
 

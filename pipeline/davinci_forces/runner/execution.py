@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from davinci_forces.records import store
 
 
+LONG = 0.25  # [s] after which a task may have held much memory; returning it takes milliseconds
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The outputs of a task or the reason why it failed, and its messages for the console."""
@@ -65,7 +68,8 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
             writer.write(diagnostic(stage_of(task.step), file_name(task.subject), "error", failed))
         return Outcome(task, _made(writer), failed, (f"error: {message}",), perf_counter() - start)
     finally:
-        store.release()
+        if perf_counter() - start > LONG:
+            store.release()
 
 
 def error_message(error: Exception) -> str:

@@ -133,13 +133,9 @@ def gather(
 
 
 def torque_constants(
-    weight_log: Weighing,
-    loads: Sequence[Load],
-    tare: Sequence[Load],
-    others: Sequence[Load],
-    robot: Robot,
+    weight_log: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot,
     spread: dict[str, float],
-) -> Iterator[TorqueConstant | Diagnostic]:
+) -> Iterator[TorqueConstant | Diagnostic]:  # fmt: skip
     """Propose the torque constant of each joint whose current was measured, so that it carries the known mass.
 
     No stage applies it.  A joint whose current shows the mass with a larger relative error than
@@ -202,13 +198,9 @@ class FreeMotionErrors(NamedTuple):
 
 
 def estimate_mass(
-    weight_log: Weighing,
-    loads: Sequence[Load],
-    tare: Sequence[Load],
-    others: Sequence[Load],
-    robot: Robot,
+    weight_log: Weighing, loads: Sequence[Load], tare: Sequence[Load], others: Sequence[Load], robot: Robot,
     spread: dict[str, float],
-) -> Iterator[Weight | FreeWeight | Diagnostic]:
+) -> Iterator[Weight | FreeWeight | Diagnostic]:  # fmt: skip
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
     free = free_motion_errors(loads, others)
     loads = tare or loads
