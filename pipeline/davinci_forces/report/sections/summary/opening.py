@@ -95,7 +95,8 @@ def forces_at_tip(context: Context) -> Iterator[str]:
     sought = [contact for contact in contacts if context.study.log(contact.log).role != "identification"]
     for contact in sought or contacts:
         row = int(np.argmax(contact.f_peak))
-        largest = context.number(f"tip.{contact.log}.{row + 1}.peak", 3)
+        largest, x, y, z = context.numbers(f"tip.{contact.log}.{row + 1}", ("peak", "f_x", "f_y", "f_z"))
+        of_all = f", the largest of {len(contact)}" * (len(contact) > 1)
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
@@ -106,7 +107,8 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         ]  # fmt: skip
         alone = ", which an effort on one joint alone makes unlikely" * (len(touched) == 1)
         yield (
-            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s), "
+            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s{of_all}), in the "
+            f"axes of the base x {x}, y {y} and z {z}, "
             f"if the arm was touched at its tip alone{alone}{beside}"
         )
     robot = context.study.robot
