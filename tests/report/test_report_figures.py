@@ -136,6 +136,7 @@ def test_an_axis_that_counts_has_whole_numbers_and_one_with_a_unit_does_not() ->
         ([1.0, 2.0], "window", ("1", "2")), ([0.0, 2.0], "window", ("0", "1", "2")),
         ([1.0, 2.0], "time [s]", ("1.0", "1.2", "1.4", "1.6", "1.8", "2.0")),
         ([0.0, 0.5], "share", ("0.0", "0.1", "0.2", "0.3", "0.4", "0.5")),
+        ([0.0, 12.0], "parameters", ("0", "5", "10")), ([0.0, 12.0], "time [s]", ("0.0", "2.5", "5.0", "7.5", "10.0")),
     ):  # fmt: skip
         assert axis_over([np.array(values)], (0.0, 0.0), False, label).with_numbers(5).texts == texts
     assert axis_over([np.array([1.0, 3.0])], (0.05, 0.05), False, "window").with_numbers(5).texts == ("1", "2", "3")

@@ -167,14 +167,9 @@ class Summary(NamedTuple):
 
 
 def summarise(
-    t: Array,
-    effort: tuple[Array, Array, Array],
-    window: tuple[float, float],
-    free: Booleans,
-    rise: float,
-    means: Sequence[tuple[int, float]],
-    constant_std: Array | None = None,
-) -> Summary | None:
+    t: Array, effort: tuple[Array, Array, Array], window: tuple[float, float], free: Booleans, rise: float,
+    means: Sequence[tuple[int, float]], constant_std: Array | None = None,
+) -> Summary | None:  # fmt: skip
     """Peak, mean and impulse of an external effort in a window [s]; None if that is empty.
 
     `effort` is the smoothed one (N,), its deviation (N,), and measured minus modelled effort (N,).

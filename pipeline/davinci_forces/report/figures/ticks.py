@@ -48,7 +48,8 @@ class Axis:
             values, step = round_values(self.low / scale, self.high / scale, intervals)
             texts = in_digits(values, step)
             widest = 1 + max((len(text.replace(".", "")) for text in texts), default=0)  # a point is narrow
-            if len(values) < 3 or widest <= capacity * step * scale / (self.high - self.low):
+            fits = len(values) < 3 or widest <= capacity * step * scale / (self.high - self.low)
+            if fits and not (self.whole and step * scale % 1.0):
                 break
         places = tuple((values * scale).tolist())
         return replace(self, label=with_power(self.label, exponent), values=places, texts=texts)
