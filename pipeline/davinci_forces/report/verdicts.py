@@ -62,7 +62,8 @@ class Trust:
     @property
     def share(self) -> float:
         """Model error over the root mean square of the effort; NaN if no run was predicted."""
-        return math.nan if self.prediction is None else share_of_effort(self.prediction)
+        p = self.prediction
+        return p.model_error / p.effort_rms if p is not None and p.effort_rms > 0 else math.nan
 
     @property
     def fineness(self) -> float:
@@ -133,8 +134,8 @@ def decisive(
     """Choose the run that decides on a joint: the worst of those that say most about unseen motion.
 
     A run in motion says more than one mostly at rest, and a whole log more than parts of one.  Among them, a new path
-    says more than a fitted one, and a log that no fit uses more than one that refits leave out.  The worst of them has
-    the largest share of its effort unexplained, by which a verdict is given.
+    says more than a fitted one, and a log that no fit uses more than one that refits leave out.  The worst has the
+    largest error: as a share, that of slow motion, whose effort is small, would always be.
     """
     by_log = {share.log: share for share in shares}
 
@@ -144,8 +145,7 @@ def decisive(
         return moves, is_out_of_log(p), not repeats_path(p, about), p.role != "identification"
 
     best = max(map(rank, predictions), default=())
-    likely = [p for p in predictions if rank(p) == best]
-    worst = max(likely, key=lambda p: (p.effort_rms > 0.0 and share_of_effort(p), p.model_error), default=None)
+    worst = max((p for p in predictions if rank(p) == best), key=lambda p: p.model_error, default=None)
     return worst, by_log.get(worst.log) if worst is not None else None
 
 
@@ -279,11 +279,6 @@ def percent(share: float) -> str:
     return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else in_format(round(100 * share), "d") + " %"
 
 
-def share_of_effort(p: Prediction) -> float:
-    """The model error over the root mean square of the effort; NaN without effort."""
-    return p.model_error / p.effort_rms if p.effort_rms > 0.0 else math.nan
-
-
 def is_hidden(error: float, std: float | None) -> bool:
     """Whether a model error, the root of a difference that is at least 0, would be printed as 0.00 ± 0.12."""
     return std is not None and std > 0.0 and error <= NO_ERROR * std
@@ -294,7 +289,7 @@ def error_share(p: Prediction | None) -> str:
     if p is None or not p.effort_rms > 0.0:
         return percent(math.nan)
     most = f"< {max(math.ceil(200.0 * p.model_error_std / p.effort_rms), 1)} %"
-    return most if is_hidden(p.model_error, p.model_error_std) else percent(share_of_effort(p))
+    return most if is_hidden(p.model_error, p.model_error_std) else percent(p.model_error / p.effort_rms)
 
 
 def thresholds() -> list[tuple[str, ...]]:
