@@ -107,8 +107,8 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         ]  # fmt: skip
         alone = ", which an effort on one joint alone makes unlikely" * (len(touched) == 1)
         yield (
-            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s{of_all}), in "
-            f"the axes of the base x {x}, y {y} and z {z}, "
+            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s{of_all}; in the "
+            f"base’s axes x: {x}, y: {y}, z: {z}), "
             f"if the arm was touched at its tip alone{alone}{beside}"
         )
     robot = context.study.robot
