@@ -164,21 +164,23 @@ def omissions(
         if inside or long or not sides:  # beside a standstill, a short transient is expected
             span = f"the period from {d.start:.2f} to {d.start + length:.2f} s"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
-            size = f"{d.rms:.3g} rms in {name}, {d.ratio:.1f} times what noise explains"
-            faults.append(f"{span} differs from the others by {size}, {what}")
+            size = f"in {name} by {d.ratio:.1f} times what noise explains"
+            faults.append(f"{span} differs from the others {size}, {what}")
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
     keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
     start, whole = t[agreeing.start], whole_periods(t[agreeing], length, first.rate)
-    of_all = f"of the {(last_time - first_time + 1.0 / first.rate) / length:.1f} periods from {first_time:.2f} s on"
-    averaged = f"{of_all}, the {whole} from {start:.2f} to {start + whole * length:.2f} s are averaged"
-    uses = "; noise levels and fits to averages leave out the rest, but the chosen model is fitted to all motion"
-    remedy = f"only if something touched the arm there, or the log is faulty there, write {' and '.join(keys)}"
-    advice = f"{uses}; {remedy} in study.toml, which removes the rest from all fits" if keys else ""
+    periods = (last_time - first_time + 1.0 / first.rate) / length
+    span = f"{start:.2f} to {start + whole * length:.2f} s"
+    used = f"Averages are of {whole} of the {periods:.1f} periods from {first_time:.2f} s on, {span}"
+    rest = "; the chosen model is fitted to all motion. Only if something touched the arm in the rest, or the log is"
+    advice = (
+        f"{rest} faulty there, write {' and '.join(keys)} in study.toml: fits then leave the rest out" if keys else ""
+    )
     short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) < 2.0 * length
     expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
     if faults:
         repeats = f"{first.log}: joints repeat every {length:.4f} s"
-        text = f"{repeats}; {'; '.join(faults)}; {averaged}{advice}"
+        text = f"{repeats}; {'; '.join(faults)}. {used}{advice}"
         yield diagnostic("average", first.log, "note" if expected else "warning", text)
 
 
