@@ -205,7 +205,7 @@ class LogTable:
             elif channel.name == log.time:
                 yield f"time = {in_toml(channel.name)}  # the log's own"
             elif is_time(channel):
-                why = "the log has its own clock" if log.clock else "a time that is not used"
+                why = "the log has its own clock" if log.clock or log.time else "a time that is not used"
                 yield f"# time = {in_toml(channel.name)}  # {why}"
             else:
                 symbol = without_joint.get(channel.name, "")
