@@ -1087,10 +1087,15 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     [line] = opening.forces_at_tip(full)
     largest = full.number(f"tip.{contact.log}.{int(np.argmax(contact.f_peak)) + 1}.peak", 3)
     row = int(np.argmax(contact.f_peak))
-    when = f"{contact.onset[row]:.1f} to {contact.release[row]:.1f} s"
+    x, y, z = (full.number(f"tip.{contact.log}.{row + 1}.{name}", 3) for name in ("f_x", "f_y", "f_z"))
+    of_all = f", the largest of {len(contact)}" if len(contact) > 1 else ""
+    when = (
+        f"{contact.onset[row]:.1f} to {contact.release[row]:.1f} s{of_all}; in the base’s axes x: {x}, y: {y}, z: {z}"
+    )
     assert (
         line == f"**{contact.log}**: force at the tip up to {largest} ({when}), if the arm was touched at its tip alone"
     )
+    assert np.hypot(np.hypot(contact.f_x, contact.f_y), contact.f_z)[row] == pytest.approx(contact.f_peak[row])
     assert float(line.partition("up to ")[2].partition(" ")[0]) == pytest.approx(contact.f_peak.max(), abs=0.05)
     [joint, *_] = full.study.robot.joints
     drive = replace(joint, gear_ratio=200.0, torque_constant=0.0438)
