@@ -12,7 +12,10 @@ from pathlib import Path
 from davinci_forces.runner.processes import workers
 
 # What the package loads when it needs it, and what else a run of all stages loads.
-LATER = ("matplotlib.figure", "pandas", "pydantic", "scipy.signal", "scipy.stats", "statsmodels.api", "typst")
+LATER = (
+    "matplotlib.figure", "pandas", "pydantic.fields", "pydantic.type_adapter", "scipy.signal", "scipy.stats",
+    "statsmodels.api", "typer._adapters", "typst",
+)  # fmt: skip
 NO_CONSTANTS: Mapping[str, float] = {}
 
 
