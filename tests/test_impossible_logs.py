@@ -11,8 +11,11 @@ from numpy.testing import assert_allclose
 
 import davinci_forces
 from davinci_forces.errors import BadLog
+from davinci_forces.filters import response
+from davinci_forces.identification import candidates, search
 from davinci_forces.records import Diagnostic, Recording
 from davinci_forces.robots.robot import UNLIMITED
+from davinci_forces.stages.forces import tune
 from davinci_forces.stages.recordings import resample
 from tests import arm
 from tests.guide.make_logs import JOINT, LINK, measured, motion, sensed
@@ -198,7 +201,17 @@ def arms() -> list[tuple[bool, str]]:
     return [(i % 2 == 0, name) for i, name in enumerate(LOGS)] + [(i % 2 == 1, name) for i, name in enumerate(FIRST)]
 
 
-@pytest.mark.usefixtures("coarse_search")
+@pytest.fixture
+def extremes(monkeypatch):
+    """Search models, ridges and delays by the first and the last value of each grid alone, the least plausible ones."""
+    for name, grid in arm.coarse_grids().items():
+        monkeypatch.setattr(search, name, (grid[0], grid[-1]))
+    monkeypatch.setattr(candidates, "RIDGES", {name: (grid[0], grid[-1]) for name, grid in candidates.RIDGES.items()})
+    monkeypatch.setattr(tune, "TRIAL_DELAYS", (tune.TRIAL_DELAYS[0], tune.TRIAL_DELAYS[-1]))
+    monkeypatch.setattr(response, "BISECTIONS", 20)
+
+
+@pytest.mark.usefixtures("extremes")
 @pytest.mark.parametrize(("velocity", "name"), arms())
 def test_no_log_however_impossible_ends_in_a_bug(tmp_path, name, velocity):
     """Identification, validation and contact are all spoilt, in an arm with or without limits and velocities."""
