@@ -192,6 +192,7 @@ def as_parquet(t, q, dq, tau) -> bytes:
 
 
 @pytest.mark.medium
+@pytest.mark.usefixtures("coarse_search")
 @pytest.mark.parametrize(("ending", "content"), [("npz", as_npz), ("xlsx", as_xlsx), ("parquet", as_parquet)])
 @pytest.mark.parametrize("command", ["ingest", pytest.param("all", marks=pytest.mark.slow)])
 def test_logs_of_arrays_go_through_new_without_an_edit(tmp_path, ending, content, command):
