@@ -2,6 +2,7 @@
 
 import sys
 import zipfile
+import zlib
 from datetime import datetime, timedelta
 from io import BytesIO
 from itertools import pairwise
@@ -399,12 +400,14 @@ def test_bombs_of_zip_and_xml_end_with_a_message_or_the_samples(bomb):
             "log.npz",
         )
     else:
-        more = entities if bomb == "entities" else lambda sheet: sheet + b" " * (1100 << 20)
         name = "log.xlsx"
         with zipfile.ZipFile(BytesIO(table)) as parts:
             members = {part: parts.read(part) for part in parts.namelist()}
         sheet = "xl/worksheets/sheet1.xml"
-        content = zipped(members | {sheet: more(members[sheet])})
+        if bomb == "entities":
+            content = zipped(members | {sheet: entities(members[sheet])})
+        else:
+            content = with_blanks(members, sheet, 1100)
     with pytest.raises(BadLog):
         read(content, name)
 
@@ -421,6 +424,27 @@ def zipped(members) -> bytes:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as parts:
         for name, content in members.items():
             parts.writestr(name, content)
+    return file.getvalue()
+
+
+def with_blanks(members, name: str, count: int) -> bytes:
+    """The same with megabytes of blanks behind one of them: one is compressed, as often as it is there."""
+    packing, blanks, file = zlib.compressobj(wbits=-zlib.MAX_WBITS), b" " * (1 << 20), BytesIO()
+    packed = packing.compress(members[name]) + packing.flush(zlib.Z_FULL_FLUSH)
+    packed += (packing.compress(blanks) + packing.flush(zlib.Z_FULL_FLUSH)) * count + packing.flush()
+    sum_of_it = zlib.crc32(members[name])
+    for _ in range(count):
+        sum_of_it = zlib.crc32(blanks, sum_of_it)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as parts:
+        for other in members.keys() - {name}:
+            parts.writestr(other, members[other])
+        info = zipfile.ZipInfo(name)
+        parts.writestr(info, packed)
+        info.compress_type, info.CRC = zipfile.ZIP_DEFLATED, sum_of_it
+        info.file_size = len(members[name]) + count * len(blanks)
+        file.seek(info.header_offset)
+        file.write(info.FileHeader())
+        file.seek(parts.start_dir)
     return file.getvalue()
 
 
