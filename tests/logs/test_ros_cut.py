@@ -95,7 +95,10 @@ def is_prefix_or_refused(content: bytes, name: str) -> tuple[int, list[str]]:
         shift = 0.0
         if channel.endswith(("/stamp", "/received")) and len(values):
             shift = before[0] - values[0]  # times count from the first message
-        np.testing.assert_allclose(values + shift, before[: len(values)], rtol=0, atol=1e-9 if shift else 0)
+        if not shift:  # a tenth of the time of what follows
+            assert np.array_equal(values, before[: len(values)], equal_nan=True), channel
+        else:
+            np.testing.assert_allclose(values + shift, before[: len(values)], rtol=0, atol=1e-9)
     counts = {name.rpartition("/")[0]: len(values) for name, values in samples.items()}
     return sum(counts.values()), log.warnings if sum(counts.values()) < COUNT * 4 // 3 else ["whole"]
 
