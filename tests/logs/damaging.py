@@ -1,8 +1,9 @@
 """Files of every format with random damages, each read to its end; run by itself, so that its memory can be measured.
 
-    python -m tests.logs.damaging <seed> <count> [1 for texts alone]
+    python -m tests.logs.damaging <seed> <count> <1 for texts alone> ...
 
-prints what happened as JSON: how many were refused, what was raised that is no BadLog, and the most memory and time.
+prints what happened as JSON, a line of each run: how many were refused, what was raised that is no BadLog, and the most
+memory so far and time.
 """
 
 import json
@@ -117,7 +118,7 @@ def own_peak() -> int:
     return int(line.split()[1])
 
 
-def main(seed: int, count: int, all_texts: int = 0) -> None:
+def main(seed: int, count: int, all_texts: int) -> None:
     """Damage and read so many files."""
     import resource
 
@@ -150,4 +151,6 @@ def main(seed: int, count: int, all_texts: int = 0) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    numbers = [int(number) for number in sys.argv[1:]]
+    for run in zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True):
+        main(*run)
