@@ -176,11 +176,25 @@ def children(pid: int) -> list[int]:
     return found
 
 
+def quarter(attempt: int, rng: np.random.Generator, done) -> int:
+    """A number of files within one quarter of all of them: the next quarter with each attempt."""
+    return int((attempt % 4 + rng.uniform()) / 4 * len(done[0]))
+
+
+def wait_until_made(files: int, folder: Path, run: subprocess.Popen) -> None:
+    """Wait until a run has made so many files, or ends."""
+    while run.poll() is None and sum(len(names) for *_, names in os.walk(processed(folder))) < files:
+        time.sleep(0.02)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is there")
 def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_is_left(raw, done, tmp_path):  # noqa: F811
-    """Parent or worker, or who does all by himself, at moments over all stages; the next run goes on."""
-    kills, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "12")), np.random.default_rng(0)
+    """Parent or worker, or who does all by himself, at moments over all stages; the next run goes on.
+
+    A moment is known by how many files there are, since how long a run takes is a matter of the machine.
+    """
+    kills, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "6")), np.random.default_rng(0)
     folder = small(raw / "lab", ("one",))
     script = tmp_path / "run.py"
     script.write_text(RUN)
@@ -190,14 +204,15 @@ def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_i
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+        wait_until_made(quarter(attempt, rng, done), folder, run)
         with suppress(subprocess.TimeoutExpired):
-            run.wait(rng.uniform(1.0, 12.0))
+            run.wait(rng.uniform(0.0, 0.3))
         started = children(run.pid)
         if attempt % 2 and started:
             with suppress(ProcessLookupError):
                 os.kill(int(rng.choice(started)), signal.SIGKILL)
             with suppress(subprocess.TimeoutExpired):
-                run.wait(2.0)
+                run.wait(1.0)
         started = {*started, *children(run.pid)}
         run.kill()
         run.wait()
@@ -341,13 +356,21 @@ def test_a_report_that_is_stopped_leaves_no_half_page(raw, begin, done, how):  #
     assert not partial_files(raw.parent)
 
 
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    """A log that takes long to read."""
+    folder = small(tmp_path_factory.mktemp("long") / "lab", ("one",))
+    table = pyarrow.csv.read_csv(folder / "one.csv")
+    parquet.write_table(pyarrow.concat_tables([table] * 10_000), folder / "one.parquet", row_group_size=1000)
+    return folder / "one.parquet"
+
+
 @LINUX
 @pytest.mark.medium
 @pytest.mark.parametrize(("jobs", "how"), [("1", "SIGINT"), ("1", "SIGTERM"), ("2", "SIGINT")])
-def test_a_run_that_is_stopped_while_a_child_reads_a_log_leaves_no_child(raw, begin, jobs, how):  # noqa: F811
+def test_a_run_that_is_stopped_while_a_child_reads_a_log_leaves_no_child(raw, begin, long_log, jobs, how):  # noqa: F811
     folder = small(raw / "lab", ("one",))
-    table = pyarrow.csv.read_csv(folder / "one.csv")
-    parquet.write_table(pyarrow.concat_tables([table] * 10_000), folder / "one.parquet", row_group_size=1000)
+    (folder / "one.parquet").hardlink_to(long_log)
     edit(folder / "study.toml", "one.csv", "one.parquet")
     run = begin("ingest", str(folder), "--jobs", jobs)
     while run.poll() is None and not any(map(reads_log, children(run.pid))):
@@ -385,14 +408,15 @@ assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 @pytest.mark.slow
 def test_whenever_a_run_is_stopped_it_says_one_line_and_the_next_goes_on(raw, begin, done):  # noqa: F811
     """From when the command line answers to signals; a signal that comes when all is done changes nothing."""
-    stops, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "12")), np.random.default_rng(1)
+    stops, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "6")), np.random.default_rng(1)
     folder, ends = small(raw / "lab", ("one",)), []
     for attempt in range(stops):
         how = str(rng.choice(list(HOW)))
         run = begin("all", str(folder), "--jobs", "1" if attempt % 3 == 2 else "2")
         wait_until_signals_are_caught(run)
+        wait_until_made(quarter(attempt, rng, done), folder, run)
         with suppress(subprocess.TimeoutExpired):
-            run.wait(rng.uniform(0.0, 9.0))
+            run.wait(rng.uniform(0.0, 0.3))
         if run.poll() is None:
             ends.append(stopped(run, how))
             assert ends[-1] in ((STOPPED, HOW[how]), ("", 0))
