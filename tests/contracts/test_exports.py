@@ -127,26 +127,27 @@ def state(about, q, dq, segment, T):
 
 
 def turned(axis_moves, q):
-    """The pose of a joint's motion: Tz(q) or Rz(q)."""
-    T = np.eye(4)
+    """The poses (N, 4, 4) of a joint's motion (N,): Tz(q) or Rz(q)."""
+    T = np.tile(np.eye(4), (len(q), 1, 1))
     if axis_moves:
-        T[2, 3] = q
+        T[:, 2, 3] = q
     else:
-        T[:2, :2] = [[np.cos(q), -np.sin(q)], [np.sin(q), np.cos(q)]]
+        T[:, :2, :2] = np.moveaxis([[np.cos(q), -np.sin(q)], [np.sin(q), np.cos(q)]], 2, 0)
     return T
 
 
 def newton_euler(document, inertial, q, dq, ddq):
-    """The efforts of a chain whose links have these ten numbers, by Newton and Euler in axes of the base."""
-    g, tau, links = document["gravity"], np.zeros(len(q)), document["chain"]["links"]
-    up, moves, wrenches = np.array(document["chain"]["up"]), [], []
+    """The efforts (N, n) of a chain whose links have these ten numbers, by Newton and Euler in axes of the base."""
+    g, tau, links = document["gravity"], np.zeros(q.shape), document["chain"]["links"]
+    up, moves, wrenches, still = np.array(document["chain"]["up"]), [], [], np.zeros((len(q), 3))
     for link in links:
-        base = (np.eye(4), np.zeros(3), np.zeros(3), g * up)
+        base = (np.eye(4), still, still, g * up + still)
         T, w, e, a = base if link["parent"] is None else moves[link["parent"]]
         k = link["coordinate"]
-        x, v, b = (0.0, 0.0, 0.0) if k is None else (q[k], dq[k], ddq[k])
+        x, v, b = still.T if k is None else (q[:, k], dq[:, k], ddq[:, k])
+        v, b = v[:, None], b[:, None]
         pose = T @ np.array(link["placement"]) @ turned(link["prismatic"], x)
-        z, r = pose[:3, 2], pose[:3, 3] - T[:3, 3]
+        z, r = pose[:, :3, 2], pose[:, :3, 3] - T[..., :3, 3]
         a = a + np.cross(e, r) + np.cross(w, np.cross(w, r))
         if link["prismatic"]:
             a = a + 2 * v * np.cross(w, z) + b * z
@@ -154,19 +155,24 @@ def newton_euler(document, inertial, q, dq, ddq):
             e, w = e + b * z + v * np.cross(w, z), w + v * z
         moves.append((pose, w, e, a))
         m, *h, xx, xy, xz, yy, yz, zz = inertial.get(link["name"], np.zeros(10))
-        R = pose[:3, :3]
-        h, J = R @ h, R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+        R = pose[:, :3, :3]
+        h, J = R @ h, R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.transpose(0, 2, 1)
         f = m * a + np.cross(e, h) + np.cross(w, np.cross(w, h))
-        wrenches.append([f, np.cross(h, a) + J @ e + np.cross(w, J @ w)])
+        wrenches.append([f, np.cross(h, a) + times(J, e) + np.cross(w, times(J, w))])
     for i in reversed(range(len(links))):
         (f, n), pose, link = wrenches[i], moves[i][0], links[i]
         if link["coordinate"] is not None:
-            tau[link["coordinate"]] += pose[:3, 2] @ (f if link["prismatic"] else n)
+            tau[:, link["coordinate"]] += (pose[:, :3, 2] * (f if link["prismatic"] else n)).sum(axis=1)
         if link["parent"] is not None:
             above = wrenches[link["parent"]]
             above[0] = above[0] + f
-            above[1] = above[1] + n + np.cross(pose[:3, 3] - moves[link["parent"]][0][:3, 3], f)
+            above[1] = above[1] + n + np.cross(pose[:, :3, 3] - moves[link["parent"]][0][:, :3, 3], f)
     return tau
+
+
+def times(matrices, vectors):
+    """Matrices (N, 3, 3) times vectors (N, 3), one by one."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 TEN = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -186,7 +192,7 @@ def predicted(document, name, q, dq, ddq, segment, T):
                 phi = phi + c * (z if function == "z" else FUNCTIONS[function](q[:, i], dq[:, i]))
             tau += p["value"] * phi
     if inertial:
-        tau += [newton_euler(document, inertial, *row)[i] for row in zip(q, dq, ddq, strict=True)]
+        tau += newton_euler(document, inertial, q, dq, ddq)[:, i]
     return tau
 
 
