@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
+from subprocess import TimeoutExpired
 
 from davinci_forces.runner.processes import workers
 
@@ -19,14 +20,53 @@ LATER = (
 NO_CONSTANTS: Mapping[str, float] = {}
 
 
-def prepare() -> None:
+def prepare(*others: str) -> None:
     """Start the process that others are forked from, if the system can, with all loaded that a run loads later."""
     if workers.METHOD == "forkserver":
         from multiprocessing import forkserver
 
-        forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded", *LATER])
+        forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded", *LATER, *others])
         forkserver.ensure_running()
     workers.prepare()
+
+
+class Started:
+    """A process that runs `davinci-forces` with words, or `python -c` code with words, as subprocess.Popen would.
+
+    It writes at the end of files: one for both streams, unless there is another for errors.
+    """
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        folder: Path,
+        environment: Mapping[str, str],
+        output: Path,
+        errors: Path | None = None,
+        constants: Mapping[str, float] = NO_CONSTANTS,
+    ) -> None:
+        prepare()
+        started = (list(words), folder, (str(output), str(errors or output)), dict(environment), dict(constants))
+        self._process = get_context(workers.METHOD).Process(target=_perform, args=started)
+        self._process.start()
+        self.pid = self._process.pid
+        self.kill = self._process.kill
+
+    @property
+    def returncode(self) -> int | None:
+        return self._process.exitcode
+
+    def poll(self) -> int | None:
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        os.kill(self.pid, number)
+
+    def wait(self, timeout: float | None = None) -> int | None:
+        self._process.join(timeout)
+        if self.returncode is None:
+            raise TimeoutExpired(str(self.pid), timeout)
+        return self.returncode
 
 
 def run(
@@ -36,20 +76,16 @@ def run(
 
     `constants` are values of constants of modules, which hold in that process alone.
     """
-    prepare()
     with tempfile.NamedTemporaryFile() as output:
-        started = (list(words), folder, output.name, dict(environment), dict(constants))
-        process = get_context(workers.METHOD).Process(target=_perform, args=started)
-        process.start()
-        process.join()
-        return process.exitcode, Path(output.name).read_text()
+        code = Started(words, folder, environment, Path(output.name), constants=constants).wait()
+        return code, Path(output.name).read_text()
 
 
 def _perform(
-    words: list[str], folder: Path, output: str, environment: dict[str, str], constants: dict[str, float]
+    words: list[str], folder: Path, outputs: tuple[str, str], environment: dict[str, str], constants: dict[str, float]
 ) -> None:
-    with open(output, "ab") as file:
-        for stream in (1, 2):
+    for stream, output in enumerate(outputs, start=1):
+        with open(output, "ab") as file:
             os.dup2(file.fileno(), stream)
     os.environ.clear()
     os.environ.update(environment)
@@ -61,6 +97,7 @@ def _perform(
             assert hasattr(import_module(module), constant), name
             setattr(import_module(module), constant, value)
         if words[:2] == ["python", "-c"]:
+            sys.argv = ["-c", *words[3:]]
             exec(compile(words[2], "<string>", "exec"), {"__name__": "__main__"})
         else:
             from davinci_forces.cli import main

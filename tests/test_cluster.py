@@ -21,7 +21,8 @@ from davinci_forces.runner.processes import arithmetic, cluster, workers
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import declaration
 from davinci_forces.study import reading
-from tests import arm
+from tests import arm, forked
+from tests.forked import Started
 from tests.test_robustness import flat
 from tests.test_runs import call, contents, processed
 
@@ -29,7 +30,8 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
 MODULE = [sys.executable, "-m"]
-RECORDINGS = int(os.environ.get("DAVINCI_FORCES_RECORDINGS", "5"))
+OF_DASK = ("distributed", "distributed.cli.dask_scheduler", "distributed.cli.dask_worker")
+RECORDINGS = int(os.environ.get("DAVINCI_FORCES_RECORDINGS", "4"))
 
 
 @dataclass
@@ -39,22 +41,42 @@ class Local:
     address: str
     log: Path
     settings: dict[str, str] = field(default_factory=dict)  # of Dask
-    processes: list[subprocess.Popen] = field(default_factory=list)
+    processes: list[subprocess.Popen | Started] = field(default_factory=list)
 
-    def start(self, *words: str, **environment: str) -> subprocess.Popen:
+    def start(self, *words: str, **environment: str) -> subprocess.Popen | Started:
+        if not environment:  # it would count where numpy is loaded
+            self.processes.append(forked_of(AS_MODULE, *words, output=self.log, **self.settings))
+            return self.processes[-1]
         with self.log.open("ab") as log:
             process = subprocess.Popen(
                 [*MODULE, *words],
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **arithmetic.blas_variables(), **self.settings, **environment},
+                env={**os.environ, **arithmetic.blas_variables(), **environment},
             )
         self.processes.append(process)
         return process
 
-    def add_worker(self, **environment: str) -> subprocess.Popen:
+    def add_worker(self, **environment: str) -> subprocess.Popen | Started:
         options = ("--nthreads", "1", "--no-dashboard", "--no-nanny")
         return self.start("distributed.cli.dask_worker", self.address, *options, **environment)
+
+
+AS_MODULE = """
+import sys
+from importlib import import_module
+import dask
+dask.config.refresh()  # by the environment
+dask.config.set({"distributed.worker.profile.enabled": False})
+import_module(sys.argv.pop(1)).main()
+"""
+
+
+def forked_of(code: str, *words: str, output: Path, errors: Path | None = None, **settings: str) -> Started:
+    """A process that runs code with words, forked from one with the package and Dask loaded."""
+    forked.prepare(*OF_DASK)
+    environment = {**os.environ, **arithmetic.blas_variables(), **settings}
+    return Started(["python", "-c", code, *words], Path.cwd(), environment, output, errors)
 
 
 @contextmanager
@@ -99,16 +121,15 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_pat
     for name in names:
         call(name, study)
     victim, _ = local.add_worker(), local.add_worker()
-    run = subprocess.Popen(
-        [sys.executable, "-c", RUN, str(there), local.address, *names], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    said = tmp_path / "said.txt"
+    run = forked_of(RUN, str(there), local.address, *names, output=said)
     tracks = processed(there) / "track"
     while run.poll() is None and not tracks.exists():
         time.sleep(0.05)
-    assert run.poll() is None, run.stdout.read().decode()
+    assert run.poll() is None, said.read_text()
     victim.send_signal(signal.SIGKILL)
-    said, _ = run.communicate(timeout=60 + 25 * RECORDINGS)
-    assert run.returncode == 0, said.decode()
+    run.wait(timeout=60 + 25 * RECORDINGS)
+    assert run.returncode == 0, said.read_text()
     made, wanted = contents(processed(there)), contents(processed(study))
     assert not [name for name in {**made, **wanted} if made.get(name) != wanted.get(name)]
 
@@ -134,17 +155,21 @@ main()
 """
 
 
-def command(*words: str) -> subprocess.Popen:
+@pytest.fixture
+def errors(tmp_path) -> Path:
+    """The file of what a command says."""
+    return tmp_path / "errors.txt"
+
+
+def command(*words: str, errors: Path) -> Started:
     """The command line, which has others run every task."""
-    return subprocess.Popen(
-        [sys.executable, "-c", MAIN, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    return forked_of(MAIN, *words, output=errors.with_name("output.txt"), errors=errors)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory) -> Path:
     """A study that one process has run."""
-    study = study_of(tmp_path_factory.mktemp("whole") / "raw" / "lab", 6)
+    study = study_of(tmp_path_factory.mktemp("whole") / "raw" / "lab", 4)
     call("measure", study)
     return study
 
@@ -156,21 +181,23 @@ def begun(whole, tmp_path) -> Path:
     return tmp_path / "raw" / "lab"
 
 
-def wait_until_made(file: Path, run: subprocess.Popen) -> None:
+def wait_until_made(file: Path, run: Started, errors: Path) -> None:
     while run.poll() is None and not file.exists():
         time.sleep(0.02)
-    assert run.poll() is None, run.communicate()
+    assert run.poll() is None, errors.read_text()
 
 
 @pytest.mark.parametrize("record", ["recording", "track"])
-def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_made(local, whole, begun, record):
+def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_made(
+    local, whole, begun, errors, record
+):
     local.add_worker()
-    run = command("measure", str(begun), "--cluster", local.address)
-    wait_until_made(processed(begun) / record, run)
+    run = command("measure", str(begun), "--cluster", local.address, errors=errors)
+    wait_until_made(processed(begun) / record, run, errors)
     local.processes[0].kill()
-    _, said = run.communicate(timeout=60)
+    run.wait(timeout=60)
     assert (
-        said
+        errors.read_text()
         == f"error: the scheduler at {local.address} does not answer any more; finished tasks are kept: run again\n"
     )
     assert run.returncode == 1
@@ -185,13 +212,13 @@ def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_m
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals")
 @pytest.mark.parametrize(("record", "number"), [("recording", signal.SIGTERM), ("fit", signal.SIGINT)])
-def test_a_run_on_a_cluster_that_is_stopped_says_so_and_goes_on_next_time(local, whole, begun, record, number):
+def test_a_run_on_a_cluster_that_is_stopped_says_so_and_goes_on_next_time(local, whole, begun, errors, record, number):
     local.add_worker()
-    run = command("measure", str(begun), "--cluster", local.address)
-    wait_until_made(processed(begun) / record, run)
+    run = command("measure", str(begun), "--cluster", local.address, errors=errors)
+    wait_until_made(processed(begun) / record, run, errors)
     run.send_signal(number)
-    _, said = run.communicate(timeout=60)
-    assert (said, run.returncode) == ("stopped; run again to continue\n", 128 + number)
+    run.wait(timeout=60)
+    assert (errors.read_text(), run.returncode) == ("stopped; run again to continue\n", 128 + number)
     for worker in local.processes[1:]:
         worker.kill()
         worker.wait()
