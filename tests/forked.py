@@ -54,7 +54,8 @@ class Started:
 
     @property
     def returncode(self) -> int | None:
-        return self._process.exitcode
+        code: int | None = self._process.exitcode
+        return code
 
     def poll(self) -> int | None:
         return self.returncode
@@ -64,7 +65,7 @@ class Started:
 
     def wait(self, timeout: float | None = None) -> int | None:
         self._process.join(timeout)
-        if self.returncode is None:
+        if timeout is not None and self.returncode is None:
             raise TimeoutExpired(str(self.pid), timeout)
         return self.returncode
 
