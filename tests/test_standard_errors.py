@@ -1,5 +1,7 @@
 """Intervals of 95 % hold the truth 95 times in 100, however the noise is correlated."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -46,27 +48,40 @@ def problems(averages: list[Average]) -> dict[str, Regression]:
     return made
 
 
-def averaged_noise(mean: Average, rho: float, seed: int, white: float = 0.0) -> averaging.Folded:
+def averaged_noise(phases: averaging.Phases, rho: float, seed: int, white: float = 0.0) -> averaging.Folded:
     """Noise of a first-order autoregression on the raw effort, of variance one, and some that is white, averaged."""
     rng = np.random.default_rng(seed)
-    N = int(mean.periods * mean.period * RATE)
+    N = len(phases.t)
     e = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.normal(size=N + 2000))[2000:] + white * rng.normal(size=N)
-    return averaging.Phases(np.arange(N) / RATE, mean.period, len(mean)).fold(e)
+    return phases.fold(e)
 
 
-def scores(averages: list[Average], rho: float, white: float = 0.0, seeds: int = SEEDS, name: str = "lse"):
-    """Errors over stated standard errors (seeds, p) of every joint, and over the classical ones."""
-    stated, classical = ({joint: [] for joint in JOINTS} for _ in range(2))
-    posed = problems(averages)
-    for seed in range(seeds):
-        noise = averaged_noise(averages[0], rho, seed, white)
+@pytest.fixture(scope="module")
+def scores(one):
+    """Errors over stated standard errors (seeds, p) of every joint, and over the classical ones, by a function.
+
+    A seed is estimated once for all tests that ask for it.
+    """
+    posed = problems(one)
+    thetas = {joint: np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0] for joint, p in posed.items()}
+    N = int(one[0].periods * one[0].period * RATE)
+    phases = averaging.Phases(np.arange(N) / RATE, one[0].period, len(one[0]))
+
+    @cache
+    def of_seed(rho, white, seed):
+        noise, errors = averaged_noise(phases, rho, seed, white), {}
         for joint, p in posed.items():
-            theta = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
+            theta = thetas[joint]
             tau, var = p.Phi @ theta + NOISE * noise.mean, NOISE**2 * noise.var
-            found = estimator(name)(Regression(p.Phi, tau, var, p.periods, p.starts, p.names))
-            stated[joint].append((found.theta - theta) / found.theta_std)
-            classical[joint].append((found.theta - theta) / found.standard_errors.classical)
-    return stated, classical
+            found = estimator("lse")(Regression(p.Phi, tau, var, p.periods, p.starts, p.names))
+            errors[joint] = [(found.theta - theta) / std for std in (found.theta_std, found.standard_errors.classical)]
+        return errors
+
+    def of_seeds(rho: float, white: float = 0.0, seeds: int = SEEDS):
+        every = [of_seed(rho, white, seed) for seed in range(seeds)]
+        return tuple({joint: [errors[joint][k] for errors in every] for joint in JOINTS} for k in (0, 1))
+
+    return of_seeds
 
 
 def coverage(scores) -> dict[str, float]:
@@ -76,9 +91,9 @@ def coverage(scores) -> dict[str, float]:
 
 @pytest.mark.medium
 @pytest.mark.parametrize("rho", [0.0, 0.97])
-def test_intervals_cover_what_they_say_where_noise_is_correlated(one, rho):
+def test_intervals_cover_what_they_say_where_noise_is_correlated(scores, rho):
     """Of 50 seeds; the classical ones do not."""
-    stated, classical = map(coverage, scores(one, rho, seeds=50))
+    stated, classical = map(coverage, scores(rho, seeds=50))
     assert min(stated.values()) > 0.90
     assert (min(classical.values()) > 0.90) == (rho == 0.0)
 
@@ -87,16 +102,16 @@ def test_intervals_cover_what_they_say_where_noise_is_correlated(one, rho):
 @pytest.mark.parametrize(("rho", "least", "most"), [
     (0.0, 0.92, 0.98), (0.5, 0.92, 0.98), (0.9, 0.92, 0.98), (0.97, 0.92, 0.98), (0.99, 0.88, 1.0),
 ])  # fmt: skip
-def test_intervals_cover_between_92_and_98_percent_up_to_a_correlation_of_97_percent(one, rho, least, most):
-    stated, _ = scores(one, rho)
+def test_intervals_cover_between_92_and_98_percent_up_to_a_correlation_of_97_percent(scores, rho, least, most):
+    stated, _ = scores(rho)
     assert all(least <= share <= most for share in coverage(stated).values()), coverage(stated)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("white", [0.3, 1.0])
-def test_intervals_cover_where_a_slow_error_hides_in_white_noise(one, white):
+def test_intervals_cover_where_a_slow_error_hides_in_white_noise(scores, white):
     """One autoregression for both would be that of the faster, and cover half of it."""
-    stated, _ = scores(one, 0.97, white)
+    stated, _ = scores(0.97, white)
     assert min(coverage(stated).values()) > 0.91
 
 
