@@ -3,7 +3,7 @@
 Everything runs on numpy arrays, complex numbers included, and on SymPy's symbols.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -70,19 +70,19 @@ def poses(q: np.ndarray) -> dict[str, np.ndarray]:
     return found
 
 
-def kinetic(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """(4.12), (4.35): velocities by the complex step, which has no truncation error worth the name."""
+def velocities(q: np.ndarray, dq: np.ndarray) -> Iterator[tuple[float, np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each body its mass, the velocity of its centre, the rates about its axes (N, 3) and (Ix, Iy, Iz).
+
+    By the complex step, which has no truncation error worth the name.  (4.12)
+    """
     h = 1e-30
     moved = poses(q + 1j * h * dq)
-    total = np.zeros(len(q))
     for name, (m, centre, inertia) in bodies(jaws=2 if q.shape[1] == 7 else 1).items():
         T, rate = moved[name].real, moved[name].imag / h
         v = rate[:, :3] @ np.array([*centre, 1.0])
         W = rate[:, :3, :3] @ T[:, :3, :3].transpose(0, 2, 1)
         w = np.stack([W[:, 2, 1], W[:, 0, 2], W[:, 1, 0]], axis=1)
-        own = np.einsum("nji,nj->ni", T[:, :3, :3], w)
-        total += m * (v**2).sum(1) / 2 + (own**2 @ np.array(inertia)) / 2
-    return total
+        yield m, v, np.einsum("nji,nj->ni", T[:, :3, :3], w), np.array(inertia)
 
 
 def potential(q: np.ndarray) -> np.ndarray:
@@ -95,14 +95,11 @@ def potential(q: np.ndarray) -> np.ndarray:
 
 
 def mass(q: np.ndarray) -> np.ndarray:
-    """M (N, n, n): kinetic energy is quadratic, so that its polarisation is exact."""
-    n = q.shape[1]
-    e = np.eye(n)
-    single = [kinetic(q, np.broadcast_to(e[i], q.shape)) for i in range(n)]
-    M = np.empty((len(q), n, n))
-    for i in range(n):
-        for j in range(n):
-            M[:, i, j] = kinetic(q, np.broadcast_to(e[i] + e[j], q.shape)) - single[i] - single[j]
+    """M (N, n, n) of twice the kinetic energy: products of the velocities that each coordinate makes.  (4.35)"""
+    M = 0.0
+    for of_each in zip(*(velocities(q, np.broadcast_to(e, q.shape)) for e in np.eye(q.shape[1])), strict=True):
+        [m, *_], v, own, [inertia, *_] = map(np.array, zip(*of_each, strict=True))
+        M = M + m * np.einsum("ink,jnk->nij", v, v) + np.einsum("ink,jnk,k->nij", own, own, inertia)
     return M
 
 
