@@ -1,9 +1,12 @@
 """A small arm of the tests' own: its robot, and recordings of known parameters, as records and as files."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from davinci_forces.identification import search
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
@@ -56,6 +59,15 @@ def coarse_grids() -> dict[str, tuple[float, ...]]:
     names = ("CUTOFF_GRID", "LAG_GRID", "RIDGE_GRID", "DISPLACEMENT_GRID", "WIDTH_GRID", "DECAY_VELOCITY_GRID")
     grids = {name: getattr(search, name) for name in names}
     return {name: (grid[0], grid[len(grid) // 2], grid[-1]) for name, grid in grids.items()}
+
+
+@contextmanager
+def searched_coarsely() -> Iterator[None]:
+    """As the fixture `coarse_search`, for what a module makes once."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, grid in coarse_grids().items():
+            patch.setattr(search, name, grid)
+        yield
 
 
 def joint(name: str) -> Joint:

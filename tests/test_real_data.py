@@ -257,6 +257,7 @@ def test_the_coupled_model_of_a_real_arm_in_c_gives_its_numbers_along_every_log(
     assert same_along_logs(export, tmp_path) == 3 * 3 * 5999
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_currents_do_not_become_a_urdf(ur10e, tmp_path):
     said = call("export", ur10e[0], "--to", "urdf", "--out", tmp_path / "out", code=1)
     [error] = [line for line in said.splitlines() if line.startswith("error: ")]

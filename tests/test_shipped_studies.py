@@ -68,6 +68,7 @@ def test_the_stiffness_of_the_phantom_is_that_of_a_line_through_its_probes(data,
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_search")
 def test_the_band_of_the_second_arm_covers_a_path_that_was_not_fitted(data, tmp_path):
     found = davinci_forces.read(analysed("dvrk-psm-2", "assess", data, tmp_path), "FreeSpace", log="slide")
     row = found[(found["joint"] == "instrument_slide") & (found["filter"] == "rts")].iloc[0]

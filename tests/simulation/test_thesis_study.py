@@ -5,6 +5,7 @@ import pytest
 import davinci_forces
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.simulation.scenario.reading import load
+from tests.arm import searched_coarsely
 from tests.test_runs import call
 
 PERIODS = 10
@@ -50,7 +51,8 @@ def test_section_7_3_has_the_noise_of_table_7_1_a_sinusoid_and_triangles():
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lab") / "raw" / "davinci-thesis"
     call("simulate", "davinci-thesis", folder)
-    call("model", folder)
+    with searched_coarsely():
+        call("model", folder)
     return folder
 
 
