@@ -187,11 +187,13 @@ def test_standard_errors_are_those_of_many_weighted_fits(two):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("short_search")
 def test_every_limit_holds_for_a_small_arm(two):
     problem = problem_of(two, harmonics=2, samples=40)
     assert_limits_hold(two, problem, design_together(problem, 1, 0)[0], WORKSPACE)
 
 
+@pytest.mark.usefixtures("short_search")
 def test_ranges_of_a_design_touch_a_limit(two):
     problem = problem_of(two, harmonics=2, samples=40)
     speeds = [max(map(abs, ranges(s)[1])) / 2.16 for s in design_together(problem, 1, 1)[0]]

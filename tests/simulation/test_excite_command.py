@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from davinci_forces import cli
 from davinci_forces.commands import excite
 from davinci_forces.errors import BadRequest, BadRobot
+from davinci_forces.maths.excitation import arm
 from davinci_forces.simulation.excitation import request
 from tests.simulation.six_joints import write
 
@@ -202,7 +203,10 @@ def test_a_robot_of_a_laboratory_can_be_excited_too(laboratory):
 
 
 @pytest.mark.slow
-def test_an_arm_of_a_urdf_is_excited_with_the_errors_that_it_may_expect(tmp_path):
+def test_an_arm_of_a_urdf_is_excited_with_the_errors_that_it_may_expect(tmp_path, monkeypatch):
+    """By a short search, since how good the trajectory is does not matter."""
+    monkeypatch.setattr(arm, "EXPLORED", 2)
+    monkeypatch.setattr(arm, "REFINED", 1)
     words = (str(write(tmp_path, 2)), "all", "--starts", "1", "--harmonics", "2", "--samples", "40")
     found = json.loads(call(*words, "--json", "--noise", "1,2", "--csv", str(tmp_path / "a.csv")))
     twice = json.loads(call(*words, "--json", "--noise", "2,4"))
