@@ -1,6 +1,7 @@
 """The limits of a hand: what speaks of the same thing agrees, and what differs differs by what it includes."""
 
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -82,14 +83,19 @@ def test_the_limit_by_simulation_is_the_same_from_every_guess(share, loop):
     assert not haptic.hand_settles(replace(linear, stiffness=2.0 * expected), THESIS_HAND)
 
 
+@pytest.fixture(scope="module")
+def loop_of_ideal():
+    """The response of an ideal arm with a delay, which is the same for every hand: each is simulated once."""
+    return cache(lambda delay: limits.loop_response(replace(IDEAL, force_delay=delay)))
+
+
 @pytest.mark.medium
 @pytest.mark.parametrize("hand", [THESIS_HAND, FIRM, MIDDLE])
 @pytest.mark.parametrize("delay", [0.0, 0.03])
-def test_with_an_ideal_arm_every_limit_is_that_of_a_held_force(hand, delay):
+def test_with_an_ideal_arm_every_limit_is_that_of_a_held_force(hand, delay, loop_of_ideal):
     """Where a swing that shrinks by 3 % in a quarter of the time counts as lasting: that is within 3 %."""
-    scenario = replace(IDEAL, force_delay=delay)
     limit, expected = (
-        limits.limits_of(scenario, "one", hand, limits.loop_response(scenario)),
+        limits.limits_of(replace(IDEAL, force_delay=delay), "one", hand, loop_of_ideal(delay)),
         sampled_limit(hand, delay, 100.0),
     )
     for name in (*SAME, "k_t_settles"):
@@ -145,9 +151,10 @@ def test_the_best_delay_is_that_of_the_largest_limit_and_no_setting_changes():
 
 
 @pytest.mark.slow
-def test_a_later_force_leaves_a_smaller_limit_and_a_weaker_one_a_larger_in_proportion():
-    later = [limits.loop_response(replace(FULL, force_delay=delay)) for delay in (0.0, 0.05, 0.1)]
-    assert (np.diff([response_limit(FIRM, *loop)[0] for loop in later]) < 0.0).all()
+def test_a_later_force_leaves_a_smaller_limit_and_a_weaker_one_a_larger_in_proportion(loop):
+    assert FULL.force_delay == 0.0
+    later = [loop, *(limits.loop_response(replace(FULL, force_delay=delay)) for delay in (0.05, 0.1))]
+    assert (np.diff([response_limit(FIRM, *of)[0] for of in later]) < 0.0).all()
     halved = replace(IDEAL, device=IDEAL.device._replace(force=0.5))
     limit = limits.limits_of(halved, "one", THESIS_HAND, limits.loop_response(halved))
     for name in SAME:
