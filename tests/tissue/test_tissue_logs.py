@@ -15,6 +15,7 @@ from davinci_forces.records import Touch
 from davinci_forces.stages.recordings import ingest
 from davinci_forces.study import WHOLE_LOG, reading
 from tests import arm
+from tests.test_shipped_studies import analysed
 
 PROBES = """[[log]]
 name = "probes"
@@ -198,12 +199,15 @@ def test_new_takes_no_other_log_for_pushes(tmp_path, header):
     assert 'role = "tissue"' not in said
 
 
-def test_real_probes_of_a_phantom(data, tmp_path):
+@pytest.fixture(scope="module")
+def phantom(data, tmp_path_factory):
+    """The study that ships, on the recordings."""
+    return analysed("palpation", "palpate", data, tmp_path_factory.mktemp("phantom"))
+
+
+def test_real_probes_of_a_phantom(phantom):
     """Public recordings of an arm with a force sensor: 453 N/m, most pushes between 423 and 507."""
-    folder = study(tmp_path)
-    (folder / "probes.csv").write_bytes((data / "palpation" / "phantom_T1_probes.csv").read_bytes())
-    stages(folder, "ingest", "palpate")
-    tissue = davinci_forces.read(folder, "Stiffness")
+    tissue = davinci_forces.read(phantom, "Stiffness", log="probes")
     counted = tissue[tissue["counted"] == 1]["k_t"]
     assert tissue["stiffness"].iloc[0] == pytest.approx(453, rel=0.05)
     assert counted.median() == pytest.approx(453, rel=0.05)
@@ -212,14 +216,9 @@ def test_real_probes_of_a_phantom(data, tmp_path):
 
 
 @pytest.mark.medium
-def test_real_pushes_over_a_surface_are_found_one_by_one(data, tmp_path):
+def test_real_pushes_over_a_surface_are_found_one_by_one(phantom):
     """A second each over six minutes; where force begins to rise is where the eye puts it: at the foot of each rise."""
-    axes = "".join(f'tip_{a} = {{ channel = "{a}", unit = "mm" }}\nforce_{a} = "f{a}"\n' for a in "xyz")
-    text = f'[[log]]\nname = "probes"\nfile = "probes.csv"\nrole = "tissue"\n[log.channels]\ntime = "t_s"\n{axes}'
-    folder = study(tmp_path, text=text)
-    (folder / "probes.csv").write_bytes((data / "palpation" / "ContPalpTrial1.csv").read_bytes())
-    stages(folder, "ingest", "palpate")
-    tissue, pushes = davinci_forces.read(folder, "Stiffness"), davinci_forces.read(folder, "Push")
+    tissue, pushes = (davinci_forces.read(phantom, kind, log="continuous") for kind in ("Stiffness", "Push"))
     assert 340 <= len(tissue) <= 380
     known = tissue.dropna(subset=["onset_depth"])
     assert len(known) > 0.6 * len(tissue)
