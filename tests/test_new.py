@@ -29,6 +29,11 @@ UNKNOWN_NAME = f"{GUESSED}, as no word of its name is known: "
 DEMO = Path(__file__).parents[1] / "raw" / "davinci-demo"
 
 
+NONE_RECOGNISED = (
+    "no shipped robot (davinci, dvrk_psm) is recognised; if it is one, run `new` again with --robot and its name"
+)
+
+
 def motion(joints: int, seed: int = 0, repeats: bool = True) -> tuple[np.ndarray, ...]:
     """Times, positions and velocities (N, joints) of smooth motion."""
     rng = np.random.default_rng(seed)
@@ -409,13 +414,13 @@ def test_three_joints_of_which_the_third_slides_are_of_the_arm_of_the_kit(tmp_pa
             7,
             0.6,
             "tau",
-            "no shipped robot (davinci, dvrk_psm) fits; if one does, run `new` again with --robot and its name",
+            NONE_RECOGNISED,
         ),
         (
             5,
             0.1,
             "tau",
-            "no shipped robot (davinci, dvrk_psm) fits; if one does, run `new` again with --robot and its name",
+            NONE_RECOGNISED,
         ),
     ],
 )

@@ -161,7 +161,7 @@ def friction_candidates(strength: float) -> list[Candidate]:
     tau = true.regressor(motion).Phi @ [*JOINT.values(), 0.8] + rng.normal(0.0, 1e-3, (K, 1))
     model = IndependentJoint("one", TERMS, ("",) * 4)
     equations = sum_equations(model.regressor(motion).Phi, tau, np.arange(K) * PATH_BLOCKS // K, PATH_BLOCKS)
-    library = Library(model, (), CellEquations(np.array([K]), equations, equations, equations))
+    library = Library(model, (), CellEquations(np.array([K]), np.zeros(1), equations, equations, equations))
     made = []
     for added, columns in (("", [0, 1, 2]), ("dahl", [0, 1, 2, 3])):
         own = IndependentJoint("one", tuple(TERMS[i] for i in columns), ("",) * len(columns))
@@ -209,7 +209,7 @@ def test_parameters_that_no_data_separate_have_errors_that_a_ridge_does_not_hide
     tau = Phi @ [1.0, 2.0, 0.0] + rng.normal(0.0, 0.1, (600, 1))
     equations = sum_equations(Phi, tau, np.arange(600) * PATH_BLOCKS // 600, PATH_BLOCKS)
     model = IndependentJoint("one", (terms.inertia, terms.viscous, terms.stiffness), ("",) * 3)
-    library = Library(model, (), CellEquations(np.array([600]), equations, equations, equations))
+    library = Library(model, (), CellEquations(np.array([600]), np.zeros(1), equations, equations, equations))
     part = CandidatePart(model, library, [0, 1, 2], Ridge(1e-3, np.ones(1), np.empty((0, 0))))
     theta, noise = solve(sum_all(equations), part.ridge), np.full(3, 0.004)
     std = np.sqrt(model_error.squares_of_ridge(part, theta, noise))
@@ -228,7 +228,7 @@ def test_parameters_with_the_least_inertia_are_the_best_of_all_with_at_least_tha
     equations = sum_equations(Phi[:, None], tau[:, None], np.arange(600) * PATH_BLOCKS // 600, PATH_BLOCKS)
     model = IndependentJoint("one", (terms.inertia, terms.viscous, terms.stiffness), ("",) * 3)
     log = SimpleNamespace(block=np.zeros(600), records=[SimpleNamespace(q=q)])
-    library = Library(model, (log,), CellEquations(np.array([600]), equations, equations, equations))  # type: ignore[arg-type]
+    library = Library(model, (log,), CellEquations(np.array([600]), np.zeros(1), equations, equations, equations))  # type: ignore[arg-type]
     part = CandidatePart(model, library, [0, 1, 2], Ridge(0.0, np.ones(1), np.empty((0, 0))))
     theta = solve(sum_all(equations), part.ridge)
     free = chosen.BlockEstimate(theta, *np.zeros((4, 3)), samples=600, condition=1.0, **chosen.scores(part, theta))

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Candidate, CandidatePart, Library, share_parameters, weights_of
-from davinci_forces.identification.chosen import LAST_DIGIT, Selection, better, reason
+from davinci_forces.identification.chosen import LAST_DIGIT, Selection, better, reason, scores
 from davinci_forces.identification.observations import CellEquations, Observed
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
@@ -69,13 +69,25 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     p = len(model.parameters)
     Phi = RNG.normal(size=(N, 1, p))
     cells = sum_equations(Phi, Phi @ np.ones(p), CELL, CELLS)
-    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells))
+    library = Library(model, (), CellEquations(np.array([N]), np.zeros(1), cells, cells, cells))
     made = RefitModel(CandidatePart(model, library, list(range(p)), PLAIN), 1)
     solved = []
     monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
     for out in (*np.eye(CELLS, dtype=bool), *np.eye(CELLS, dtype=bool)):
         assert_allclose(made.theta(cells, out), 1.0, rtol=1e-9)
     assert len(solved) == CELLS
+
+
+def test_r2_is_the_share_of_the_effort_s_variance_whatever_its_mean():
+    """A mean that a model holds, as of gravity, is no merit of its: of two efforts, each has its own."""
+    theta = RNG.normal(size=PHI.shape[2])
+    tau = PHI @ theta + RNG.normal(size=PHI.shape[:2]) + 50.0 * np.arange(1, PHI.shape[1] + 1)
+    cells = sum_equations(PHI, tau, CELL, CELLS)
+    library = SimpleNamespace(cells=CellEquations(np.full(PHI.shape[1], N), tau.sum(axis=0), cells, cells, cells))
+    error = tau - PHI @ theta
+    given = scores(SimpleNamespace(by_block=cells, library=library), theta)
+    assert given["r2"] == pytest.approx(1.0 - (error**2).sum() / ((tau - tau.mean(axis=0)) ** 2).sum(), rel=1e-9)
+    assert given["mse"] == pytest.approx((error**2).mean(axis=0).sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize(("period", "refit"), [([0, 0, 0, -1], [0, 0, 0, -1]), ([-1] * 4, [0] * 4)])

@@ -416,8 +416,9 @@ def test_a_current_without_a_position_is_not_called_a_joint_at_rest(tmp_path):
 def test_why_the_robot_beside_the_logs_is_not_taken_is_said(tmp_path, change, why):
     bench(tmp_path, "t,q1,q2,q3,dq1,dq2,dq3,tau1,tau2,tau3")
     (tmp_path / "bench.urdf").write_text(URDF.replace(*change, 1))
-    assert f"written for the 3 joints of the logs, as no shipped robot (davinci, dvrk_psm) fits; {why}" in " ".join(
-        call("new", tmp_path).split()
+    assert (
+        f"written for the 3 joints of the logs, as no shipped robot (davinci, dvrk_psm) is recognised; {why}"
+        in " ".join(call("new", tmp_path).split())
     )
 
 

@@ -196,7 +196,7 @@ def scores(part: CandidatePart, theta: Array) -> dict[str, float]:
     cells, total, samples = part.by_block, sum_all(part.by_block), part.library.cells.samples
     errors, by_cell = total.errors(theta)[0], (cells.errors(theta) / samples).sum(axis=1)[cells.squares.any(axis=1)]
     mse, std = float((errors / samples).sum()), len(by_cell) * error_of_mean(by_cell)
-    unexplained = float(errors.sum() / total.squares.sum())
+    unexplained = float(errors.sum() / (total.squares.sum() - (part.library.cells.sums**2 / samples).sum()))
     return {"mse": mse, "mse_std": std, "r2": 1.0 - unexplained, "r2_std": unexplained * std / (mse or 1.0)}
 
 

@@ -180,6 +180,7 @@ class CellEquations(NamedTuple):
     """The normal equations of a model, by cells of the data."""
 
     samples: Integers  # (m,) number of samples of each effort
+    sums: Array  # (m,) of these samples
     by_block: Equations  # 6 cells a log
     by_period: Equations  # 20 cells a log
     scored: Equations  # 6 cells a log, of the motion and the effort as they are scored
@@ -187,13 +188,16 @@ class CellEquations(NamedTuple):
 
 def equations(model: Model, logs: Sequence[Observed], count: int) -> CellEquations:
     """Return the normal equations of all `count` logs, in cells of the path and of the periods."""
-    samples, by_block, by_period, scored = np.zeros(len(model.efforts), np.int64), [], [], []
+    samples, sums = np.zeros(len(model.efforts), np.int64), np.zeros(len(model.efforts))
+    by_block, by_period, scored = [], [], []
     for log in logs:
         differs = any(processing.cutoff != log.lowpass for processing in log.processing)
         passed, rows = log.rows_at(model, [None, log.lowpass] if differs else [None])
         samples += (~np.isnan(passed[0][1])).sum(axis=0)
+        sums += np.nansum(passed[0][1], axis=0)
         by_block.append(sum_equations(*passed[0], log.block[rows], PATH_BLOCKS))
         by_period.append(sum_equations(*passed[0], log.period[rows], MAX_GROUPS))
         scored.append(sum_equations(*passed[1], log.block[rows], PATH_BLOCKS) if differs else by_block[-1])
     numbers = [log.number for log in logs]
-    return CellEquations(samples, *(side_by_side(part, numbers, count) for part in (by_block, by_period, scored)))
+    every = (side_by_side(part, numbers, count) for part in (by_block, by_period, scored))
+    return CellEquations(samples, sums, *every)

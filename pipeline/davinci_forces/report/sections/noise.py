@@ -66,7 +66,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
                 name = f"**{parts.run_name(average)}**"
                 which = f"period{'' if len(noisy) == 1 else 's'} {', '.join(map(str, noisy[:5]))} of {len(rms)}"
                 message = f"{name}: {meaning} noise of {which} is {times} times that of the median period."
-                start = " The arm may not yet have settled: set `skip`." if noisy[0] == 1 else ""
+                start = " The arm may not yet have settled." if noisy[0] == 1 else ""
                 yield Verdict("warn", message + start)
 
 

@@ -149,7 +149,7 @@ def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, r
     reach = Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(np.mean(dq**2)))))
     every = with_every_term(robot.joint(model.group), reach)
     cells = side_by_side([block_equations(every, part.source) for part in parts], range(len(parts)), len(parts))
-    library = Library(every, (), CellEquations(np.zeros(1, int), cells, cells, cells))
+    library = Library(every, (), CellEquations(np.zeros(1, int), np.zeros(1), cells, cells, cells))
     candidates = variants(robot, "independent", {model.group: reach}, [library])
     try:
         theta = regression.triangle.theta

@@ -28,7 +28,7 @@ MAX_PEAKS = 6  # contacts of which page one states each peak
 # Of its peak: the mean of the middle half of a push that is held, and the least within the peak's error; a triangle's
 # is three quarters.
 HELD, MIN_HELD = 0.9, 0.85
-PLATEAU = 0.97  # of the largest effort of a contact, the last of which has the dot
+PLATEAU, LONG_PLATEAU = 0.97, 0.2  # of a contact's largest effort; of its duration: the end of a longer one has the dot
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -175,7 +175,7 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
     ]
     which = "Contact peaks" if is_short else "Largest contact peak of each joint"
     text = f" {which}{named}: {as_list(peaks)}." if peaks else ""
-    sought = {track.joint for track in context.catalogue.select(Track, role="contact")}
+    sought = {track.joint for track in context.catalogue.select(Track, role="contact") if not track.at_rest}
     # A joint that something seems to touch in free motion has a level that this touch may have raised.
     of_levels = context.catalogue.select(Diagnostic, stage="assess")
     doubted = {d.subject.rpartition(".")[2] for d in of_levels if "warning" in d.severity.tolist()}
@@ -250,12 +250,13 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 def named_peaks(track: Track, contact: Contact) -> Points:
     """The peak of each contact that was found, with its value unless a larger one is close by."""
-    places, rows = [], contact.found > 0
-    for start, end in zip(contact.onset[rows], contact.release[rows], strict=True):
-        inside = np.flatnonzero((track.t >= start) & (track.t <= end))
+    times, rows = [], contact.found > 0
+    for start, end, at in zip(contact.onset[rows], contact.release[rows], contact.t_peak[rows], strict=True):
+        inside = (track.t >= start) & (track.t <= end)
         size = np.abs(track.tau_ext_smooth[inside])
-        places.append(inside[np.flatnonzero(size >= PLATEAU * size.max())[-1]])  # its value would cover a plateau
-    t, peaks, width = track.t[places], contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
+        last = track.t[inside][size >= PLATEAU * size.max()][-1]
+        times.append(last if last - at > LONG_PLATEAU * (end - start) else at)  # its value would cover a plateau
+    t, peaks, width = np.array(times), contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     largest = [(np.abs(peaks[np.abs(t - at) < width]) <= abs(p)).all() for at, p in zip(t, peaks, strict=True)]
     names = tuple(in_format(p, "+.3g") if named else "" for named, p in zip(largest, peaks, strict=True))
     return Points(t, peaks, "", "black", names=names)
