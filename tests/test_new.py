@@ -30,7 +30,8 @@ DEMO = Path(__file__).parents[1] / "raw" / "davinci-demo"
 
 
 NONE_RECOGNISED = (
-    "no shipped robot (davinci, dvrk_psm) is recognised; if it is one, run `new` again with --robot and its name"
+    "no shipped robot (davinci, dvrk_psm) is recognised; if it is one, delete study.toml and run `new` again with "
+    "--robot and its name"
 )
 
 

@@ -124,7 +124,7 @@ def arm_of(
         again = f"run `new` again with --robot {name}, which takes the first 3 joints"
         why = ["no name says which arm it is", *why_not, f"if it is {kit}, {again}"]
     else:
-        remedy = "if it is one, run `new` again with --robot and its name"
+        remedy = "if it is one, delete study.toml and run `new` again with --robot and its name"
         why = [f"no shipped robot ({', '.join(robots.ROBOTS)}) is recognised", *(why_not or [remedy])]
     name = ROBOT_FILE if not (folder / ROBOT_FILE).exists() else f"robot-of-{n}.toml"
     largest = max(counted, key=lambda holding: holding.joints)

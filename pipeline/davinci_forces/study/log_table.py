@@ -80,7 +80,7 @@ class LogTable:
             *self._role(),
             *([] if self.draft.touching else [period]),
             *self._rate(),
-            "# skip = 1.0  # [s] start-up transient to leave out",
+            "# skip = 1.0  # [s] at the start to leave out of every fit, if it was touched or is faulty",
             "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out",
             *self._contact(),
             "[log.channels]",

@@ -43,9 +43,9 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     roles = {trusted.space.role for trusted in trusts if trusted.space is not None}
     if roles and not any(trusted.narrow for trusted in trusts):
         where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
-        wide = [t for t in trusts if t.narrowest is not None and band(t.narrowest.coverage) == "info"]
-        which = f"on {as_list([name_in_sentence(t.joint) for t in wide])}, and too narrow on none"
-        width = f"is too wide {which}" if wide else "of each joint is wide enough"
+        known = [(name_in_sentence(t.joint), s) for t in trusts if (s := t.narrowest) is not None]
+        wide = [name for name, s in known if verdicts.band_in_words(s.coverage, s.coverage_std) == "too wide"]
+        width = f"is too wide on {as_list(wide)}, and too narrow on none" if wide else "of each joint is wide enough"
         parts += [f"{where} the 95 % band {width}"]
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
