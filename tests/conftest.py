@@ -11,6 +11,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -186,6 +187,22 @@ def coarse_search(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name, grid in coarse_grids().items():
         monkeypatch.setattr(search, name, grid)
+
+
+def quick_limits() -> dict[str, Any]:
+    """Constants of coarser limits of hands, for tests that read none of these numbers.
+
+    Fewer frequencies of the loop's response, and shorter and fewer trials of whether a hand settles.
+    """
+    from davinci_forces.haptics.loop import FREQUENCIES
+
+    few = FREQUENCIES[::5]
+    return {
+        "davinci_forces.haptics.loop.FREQUENCIES": few,
+        "davinci_forces.haptics.limits.FREQUENCIES": few,
+        "davinci_forces.haptics.loop.SETTLING_PERIODS": 8.0,
+        "davinci_forces.haptics.maths.delay.TRIAL_HALVINGS": 2,
+    }
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:

@@ -9,6 +9,7 @@ from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from subprocess import TimeoutExpired
+from typing import Any
 
 from davinci_forces.runner.processes import workers
 
@@ -17,7 +18,7 @@ LATER = (
     "matplotlib.figure", "pandas", "pydantic.fields", "pydantic.type_adapter", "scipy.signal", "scipy.stats",
     "statsmodels.api", "typer._adapters", "typst",
 )  # fmt: skip
-NO_CONSTANTS: Mapping[str, float] = {}
+NO_CONSTANTS: Mapping[str, Any] = {}
 
 
 def prepare(*others: str) -> None:
@@ -43,7 +44,7 @@ class Started:
         environment: Mapping[str, str],
         output: Path,
         errors: Path | None = None,
-        constants: Mapping[str, float] = NO_CONSTANTS,
+        constants: Mapping[str, Any] = NO_CONSTANTS,
     ) -> None:
         prepare()
         started = (list(words), folder, (str(output), str(errors or output)), dict(environment), dict(constants))
@@ -71,7 +72,7 @@ class Started:
 
 
 def run(
-    words: Sequence[str], folder: Path, environment: Mapping[str, str], constants: Mapping[str, float] = NO_CONSTANTS
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], constants: Mapping[str, Any] = NO_CONSTANTS
 ) -> tuple[int | None, str]:
     """The exit code and the output of `davinci-forces` with words, or of `python -c` code, in a folder.
 
@@ -83,7 +84,7 @@ def run(
 
 
 def _perform(
-    words: list[str], folder: Path, outputs: tuple[str, str], environment: dict[str, str], constants: dict[str, float]
+    words: list[str], folder: Path, outputs: tuple[str, str], environment: dict[str, str], constants: dict[str, Any]
 ) -> None:
     for stream, output in enumerate(outputs, start=1):
         with open(output, "ab") as file:

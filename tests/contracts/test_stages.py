@@ -19,6 +19,7 @@ from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration, function_of, steps
 from davinci_forces.stages import STAGES, module
+from tests.conftest import quick_limits
 from tests.contracts.conftest import Lab, shorten
 
 STEP = pytest.mark.parametrize("step", every_step())
@@ -78,9 +79,12 @@ def same(one: Record, other: Record) -> None:
 
 
 @STEP
+@pytest.mark.usefixtures("coarse_search")
 def test_the_same_records_give_the_same_records_and_nothing_else_is_read(step: str, lab: Lab, monkeypatch):
     """Twice on the very same arguments, which stay as they are, and with the study's files moved away meanwhile."""
     shorten(monkeypatch)
+    for name, value in quick_limits().items():
+        monkeypatch.setattr(name, value)
     run, asks = function_of(step), declaration(step)
     files = [lab.folders.processed, *([] if "log" in asks.given.values() else [lab.study.folder])]
     made: Counter[tuple[str, ...]] = Counter()

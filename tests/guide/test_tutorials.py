@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests import forked
-from tests.conftest import QUICK_DESIGN, ROOT
+from tests.conftest import QUICK_DESIGN, ROOT, quick_limits
 from tests.guide.make_logs import LOGS
 
 GUIDE = ROOT / "pipeline" / "davinci_forces" / "guide"
@@ -26,9 +26,9 @@ def pattern(line: str) -> str:
 
 
 def command(line: str, folder: Path) -> tuple[int | None, str]:
-    """The exit code and the output of a command.  No tutorial shows a number of the robot's design."""
+    """The exit code and the output of a command.  No tutorial shows a number of the design or a limit of a hand."""
     if line.startswith("davinci-forces "):
-        return forked.run(shlex.split(line), folder, ENVIRONMENT, QUICK_DESIGN)
+        return forked.run(shlex.split(line), folder, ENVIRONMENT, QUICK_DESIGN | quick_limits())
     done = subprocess.run(line, shell=True, cwd=folder, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True)
     return done.returncode, done.stdout
 
