@@ -2,11 +2,13 @@
 
 import ast
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from string import Formatter
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -32,6 +34,7 @@ from davinci_forces.records import (
     PeriodResidual,
     Prediction,
     Push,
+    Record,
     Spectrum,
     Stiffness,
     Streamed,
@@ -65,7 +68,7 @@ from davinci_forces.report.content.inline import parse
 from davinci_forces.report.content.layout import TEXTS, number_blocks
 from davinci_forces.report.content.marks import Line, Points, VSpan
 from davinci_forces.report.context import Context, name_in_sentence, title
-from davinci_forces.report.results import Results, collect
+from davinci_forces.report.results import Result, Results, collect
 from davinci_forces.report.sections import (
     DOCUMENTS,
     SECTIONS,
@@ -219,13 +222,81 @@ def test_a_study_without_records_has_no_section_or_one_that_says_so(name: str, l
         number_blocks(Document("A test", "arm", True, (section,)))
 
 
+def asking_for_all(name: str) -> Callable[..., Any]:
+    """A method of results that notes that it was asked for all of them."""
+
+    def method(self, *arguments: Any) -> Any:
+        self.asked.add(None)
+        return getattr(Results, name)(self, *arguments)
+
+    return method
+
+
+class Watched(Results):
+    """Results that note which of them are asked for, by key; `None` stands for all."""
+
+    def __init__(self, results: Results) -> None:
+        super().__init__(results)
+        self.asked: set[str | None] = set()
+
+    def __getitem__(self, key: str) -> Result:
+        self.asked.add(key)
+        return super().__getitem__(key)
+
+    def __contains__(self, key: object) -> bool:
+        self.asked.add(str(key))
+        return super().__contains__(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self.asked.add(key)
+        return super().get(key, default)
+
+    __iter__, __len__, keys, values, items, json, copy = map(
+        asking_for_all, ("__iter__", "__len__", "keys", "values", "items", "json", "copy")
+    )
+
+
+class Unread(NamedTuple):
+    """A section of the whole study, and the kinds of record that it did not ask for: without these it is the same."""
+
+    section: Section | None
+    kinds: set[type[Record]]
+
+
+@pytest.fixture(scope="module")
+def unread(lab: Lab, catalogue: Catalogue) -> dict[str, Unread]:
+    """The sections by their names, written in the order of their documents."""
+    publish: dict[str, set[type[Record]]] = {}
+    for kind in KINDS.values():
+        for number in [number for record in catalogue.records(kind) for number in record.published()]:
+            publish.setdefault(number.key, set()).add(kind)
+    asked: set[type[Record]] = set()
+    watching = Catalogue(catalogue.records)
+    whole = replace(context(lab, catalogue), labels=frozenset())
+    results = Watched(whole.results)
+    whole = replace(whole, catalogue=watching, results=results)
+    found = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(watching, "records", lambda kind: asked.add(kind) or catalogue.records(kind))
+        for name in [name for _, names in DOCUMENTS.values() for name in names]:
+            asked.clear()
+            results.asked.clear()
+            section = written(name, whole)
+            kinds = asked.union(*(publish.get(key, set()) for key in results.asked))
+            everything = None in results.asked or name == "ground_truth"  # which adds results, that others may show
+            found[name] = Unread(section, set() if everything else {*KINDS.values()} - kinds)
+    return found
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_kind_of_record_that_is_missing_costs_no_section(kind: str, lab: Lab, catalogue: Catalogue):
+def test_a_kind_of_record_that_is_missing_costs_no_section(
+    kind: str, lab: Lab, catalogue: Catalogue, unread: dict[str, Unread]
+):
     """As it is when its stage failed, or has not run; what is left refers to nothing that is not there."""
     poorer = replace(context(lab, without(catalogue, KINDS[kind])), labels=frozenset())  # so no rated figure, either
     for _, names in DOCUMENTS.values():
-        sections = tuple(section for name in names if (section := written(name, poorer)))
-        number_blocks(Document("A test", "arm", True, sections))
+        sections = (u.section if KINDS[kind] in (u := unread[n]).kinds else written(n, poorer) for n in names)
+        number_blocks(Document("A test", "arm", True, tuple(filter(None, sections))))
 
 
 def test_the_sections_together_are_a_document_whose_labels_differ_and_whose_references_lead_somewhere(full: Context):
