@@ -179,6 +179,14 @@ def quick_design() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def single_causes() -> Iterator[None]:
+    """Causes of innovations that are not white are tried one at a time, for tests that read none of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("davinci_forces.filters.innovations.search.MAX_CAUSES", 1)
+        yield
+
+
 @pytest.fixture
 def coarse_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A coarser search for models, for tests of what does not depend on which model is found."""

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def analysed(data, tmp_path_factory) -> tuple[Path, str]:
+def analysed(data, single_causes, tmp_path_factory) -> tuple[Path, str]:
     """The shipped study of the arm on the recordings, and what was said: of a path to learn from and another one."""
     study = tmp_path_factory.mktemp("ur10e") / "raw" / "ur10e"
     shutil.copytree(SHIPPED, study)

@@ -20,7 +20,7 @@ JOINTS = ("hand_roll", "hand_pitch", "instrument_slide")
 
 
 @pytest.fixture(scope="module")
-def dvrk(data, quick_design, tmp_path_factory):
+def dvrk(data, quick_design, single_causes, tmp_path_factory):
     """The committed study of the public identification data, on the recordings themselves."""
     study = tmp_path_factory.mktemp("real") / "raw" / "dvrk-psm"
     shutil.copytree(ROOT / "raw" / "dvrk-psm", study)
