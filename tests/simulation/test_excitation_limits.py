@@ -95,8 +95,8 @@ def test_the_gradient_of_the_search_is_that_of_differences(six, criterion):
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_search")
 def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random(six):
-    """The criterion of 300 random trajectories of size 1 within the same limits: at least 8 above the design's."""
-    problem, random = problem_of(six, samples=60), np.random.default_rng(0)
+    """The criterion of 300 random trajectories of size 1 within the same limits: at least 12 above the design's."""
+    problem, random = problem_of(six, samples=40), np.random.default_rng(0)
     series, optima = design_together(problem, 1, 0)
     assert_limits_hold(six, problem, series, WORKSPACE)
     best = np.inf
@@ -107,12 +107,12 @@ def test_six_joints_are_excited_within_every_limit_and_far_better_than_at_random
             shrink_to_limits(j, Fourier.from_coefficients(c, 10.0)) for j, c in zip(problem.joints, x, strict=True)
         ]
         best = min(best, float(determinant(arm_observation(problem, feasible))))  # without efforts and workspace
-    assert optima.min() <= best - 8
+    assert optima.min() <= best - 12
 
 
 @pytest.mark.slow
 def test_five_starts_of_the_da_vinci_agree():
-    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles(), samples=150)
+    problem = problem_of(robots.load("davinci", "."), harmonics=2, obstacles=Obstacles(), samples=40)
     assert np.ptp(design_together(problem, 5, 0)[1]) <= 0.02
 
 
@@ -120,7 +120,7 @@ def test_five_starts_of_the_da_vinci_agree():
 @pytest.mark.usefixtures("short_search")
 def test_the_dvrk_psm_is_excited_within_its_limits():
     robot = robots.load("dvrk_psm", ".")
-    problem = problem_of(robot, harmonics=None, obstacles=Obstacles())
+    problem = problem_of(robot, harmonics=None, obstacles=Obstacles(), samples=60)
     series, _ = design_together(problem, 1, 0)
     assert_limits_hold(robot, problem, series, Obstacles())
 
