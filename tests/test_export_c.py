@@ -104,19 +104,17 @@ def test_floats_give_four_digits_over_a_whole_log(structure, tmp_path):
 
 def test_inertia_bias_and_gravity_are_those_of_the_model(model):
     given, compiled = model
-    moved = motion(len(given.joints), N=40)
+    moved, N = motion(len(given.joints), N=40), 40
     compiled.restart()
     for i, joint in enumerate(given.joints):
         row, theta = joint.model.efforts.index(joint.name), joint.fit.theta
-        for k in range(len(moved.q)):
-            [q], [dq], [ddq] = (x[k : k + 1] for x in moved[:3])
-            alone = motion_of(
-                joint, moved._replace(**{x: getattr(moved, x)[k : k + 1] for x in ("q", "dq", "ddq", "segment")})
-            )
-            still = alone._replace(dq=0 * alone.dq, ddq=0 * alone.ddq)
-            M = (joint.model.inertia_columns(alone.q) @ theta)[0, row, row]
-            unaccelerated = alone._replace(ddq=0 * alone.ddq)
-            tau, G, b = (efforts(joint.model, theta, x)[0, row] for x in (alone, still, unaccelerated))
+        alone = motion_of(joint, moved._replace(segment=np.arange(N)))  # every sample begins anew
+        still = alone._replace(dq=0 * alone.dq, ddq=0 * alone.ddq)
+        unaccelerated = alone._replace(ddq=0 * alone.ddq)
+        inertias = (joint.model.inertia_columns(alone.q) @ theta)[:, row, row]
+        of_model = (efforts(joint.model, theta, x)[:, row] for x in (alone, still, unaccelerated))
+        for k, (M, tau, G, b) in enumerate(zip(inertias, *of_model, strict=True)):
+            q, dq, ddq = (x[k] for x in moved[:3])
             size = 1e-12 * max(abs(tau), abs(b), abs(M), 1.0)
             assert compiled.call("inertia", i, q)[1] == pytest.approx(M, abs=size)
             assert compiled.call("bias", i, q, dq, state=True)[1] == pytest.approx(b, abs=size)
