@@ -188,13 +188,12 @@ def single_causes() -> Iterator[None]:
 
 
 @pytest.fixture
-def coarse_search(monkeypatch: pytest.MonkeyPatch) -> None:
+def coarse_search() -> Iterator[None]:
     """A coarser search for models, for tests of what does not depend on which model is found."""
-    from davinci_forces.identification import search
-    from tests.arm import coarse_grids
+    from tests.arm import searched_coarsely
 
-    for name, grid in coarse_grids().items():
-        monkeypatch.setattr(search, name, grid)
+    with searched_coarsely():
+        yield
 
 
 def quick_limits() -> dict[str, Any]:

@@ -199,5 +199,5 @@ def equations(model: Model, logs: Sequence[Observed], count: int) -> CellEquatio
         by_period.append(sum_equations(*passed[0], log.period[rows], MAX_GROUPS))
         scored.append(sum_equations(*passed[1], log.block[rows], PATH_BLOCKS) if differs else by_block[-1])
     numbers = [log.number for log in logs]
-    every = (side_by_side(part, numbers, count) for part in (by_block, by_period, scored))
-    return CellEquations(samples, sums, *every)
+    cells = (side_by_side(part, numbers, count) for part in (by_block, by_period, scored))
+    return CellEquations(samples, sums, *cells)

@@ -99,8 +99,7 @@ def by_numbers(channels: Sequence[Channel]) -> Holding:
                 joint, reason = labels.index(label), f"joint {label!r}" if label else "by its name"
             else:
                 continue
-            motor = AT_MOTOR.get(symbol, symbol) if "motor" in names.words_of(name) else symbol
-            meanings[name] = Meaning(motor, joint, reason, "" if units[name] else usual)
+            meanings[name] = Meaning(_side_by_name(symbol, name), joint, reason, "" if units[name] else usual)
     meanings = with_one_effort(meanings)
     joints = 1 + max(meaning.joint for meaning in meanings.values())
     return Holding(meanings, joints, () if numbers else tuple(labels))
@@ -120,10 +119,7 @@ def by_words(channels: Sequence[Channel]) -> Holding:
     if len(labels) < 2 or not alike or in_labels & names.PROCESSED_WORDS:
         return Holding()
     meanings = {
-        name: Meaning(
-            AT_MOTOR.get(symbol, symbol) if "motor" in names.words_of(name) else symbol,
-            labels.index(label), f"joint {label!r}",
-        )
+        name: Meaning(_side_by_name(symbol, name), labels.index(label), f"joint {label!r}")
         for symbol, by_label in named.items() for label, name in by_label.items() if label in labels
     }  # fmt: skip
     return Holding(with_one_effort(meanings), len(labels), tuple(labels))
@@ -148,6 +144,11 @@ def with_one_effort(meanings: dict[str, Meaning]) -> dict[str, Meaning]:
     """Leave out the currents of joints with efforts: a study takes one, and an effort needs no drive constant."""
     with_effort = {meaning.joint for meaning in meanings.values() if meaning.symbol == "tau"}
     return {name: m for name, m in meanings.items() if m.symbol != "i" or m.joint not in with_effort}
+
+
+def _side_by_name(symbol: str, name: str) -> str:
+    """The symbol on the motor's side where the channel's name says so."""
+    return AT_MOTOR.get(symbol, symbol) if "motor" in names.words_of(name) else symbol
 
 
 def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:

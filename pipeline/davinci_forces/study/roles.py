@@ -167,8 +167,8 @@ def _by_motion(
             roles[i] = Role("validation", f"{how} of {within}, which identifies")
         else:
             but = f", but that of {within} does" if within else ""
-            known = f"its motion does not repeat{but}" if holding.ranges else "CHECK: no position in it is known"
-            roles[i] = Role("validation", known)
+            why = f"its motion does not repeat{but}" if holding.ranges else "CHECK: no position in it is known"
+            roles[i] = Role("validation", why)
     return roles | _not_repeating(recordings, late, reach, any(tested))
 
 

@@ -26,7 +26,6 @@ class Difference(NamedTuple):
     period: int  # counted from 0
     periods: int
     start: float  # [s] of the period
-    rms: float  # of the difference beyond noise
     ratio: float  # root mean square of the difference over what noise explains
 
     @property
@@ -159,8 +158,8 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
             rho = _lag_one_of_others(np.delete(sums, m, axis=0), np.delete(counts, m, axis=0))
             if is_unlikely(float(ratio[m]) ** 2, rho, K, degrees[m]):
                 period, periods = int(number[first[m]]), int(number[-1]) + 1
-                sizes = float(rms[m]), float(ratio[m])
-                differences.append(Difference(signal, period, periods, float(t[0]) + period * length, *sizes))
+                start = float(t[0]) + period * length
+                differences.append(Difference(signal, period, periods, start, float(ratio[m])))
     return differences
 
 

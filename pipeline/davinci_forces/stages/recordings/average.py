@@ -172,10 +172,9 @@ def omissions(
     periods = (last_time - first_time + 1.0 / first.rate) / length
     span = f"{start:.2f} to {start + whole * length:.2f} s"
     used = f"Averages are of {whole} of the {periods:.1f} periods from {first_time:.2f} s on, {span}"
-    rest = "; the chosen model is fitted to all motion. Only if something touched the arm in the rest, or the log is"
-    advice = (
-        f"{rest} faulty there, write {' and '.join(keys)} in study.toml: fits then leave the rest out" if keys else ""
-    )
+    rest = "; the chosen model is fitted to all motion. Only if something touched the arm in the rest, or the log is "
+    remedy = f"faulty there, write {' and '.join(keys)} in study.toml: fits then leave the rest out"
+    advice = rest + remedy if keys else ""
     short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) < 2.0 * length
     expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
     if faults:

@@ -43,8 +43,8 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
     roles = {trusted.space.role for trusted in trusts if trusted.space is not None}
     if roles and not any(trusted.narrow for trusted in trusts):
         where = "in free motion" if "identification" in roles else "in free motion that was not fitted,"
-        known = [(name_in_sentence(t.joint), s) for t in trusts if (s := t.narrowest) is not None]
-        wide = [name for name, s in known if verdicts.band_in_words(s.coverage, s.coverage_std) == "too wide"]
+        spaces = [(name_in_sentence(t.joint), s) for t in trusts if (s := t.narrowest) is not None]
+        wide = [name for name, s in spaces if verdicts.band_in_words(s.coverage, s.coverage_std) == "too wide"]
         width = f"is too wide on {as_list(wide)}, and too narrow on none" if wide else "of each joint is wide enough"
         parts += [f"{where} the 95 % band {width}"]
     text = "; ".join(parts)
