@@ -137,9 +137,9 @@ def test_innovations_are_those_of_the_filter_and_each_as_large_as_stated():
 def test_without_memory_the_coloured_filter_is_the_plain_one():
     recording, _ = matched("hand_roll", N=500)
     plain, own = coloured.Noise(NOISE, coloured.UNCOLOURED), tracker("ekf")(recording, NOISE)
-    i_q, i_dq = coloured.innovations(recording, plain)
-    assert_allclose(i_q, own.innovation_q, atol=1e-11)
-    assert_allclose(i_dq, own.innovation_dq, atol=1e-10)
+    tracked = coloured.track(recording, plain)
+    assert_allclose(tracked.innovation_q, own.innovation_q, atol=1e-11)
+    assert_allclose(tracked.innovation_dq, own.innovation_dq, atol=1e-10)
     assert coloured.log_likelihood(recording, plain) == pytest.approx(ekf.log_likelihood(recording, NOISE), rel=1e-9)
 
 

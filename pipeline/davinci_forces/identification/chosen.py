@@ -78,7 +78,7 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     models, results = zip(*pairs, strict=True)
     physical = tuple(c.is_physical for c in models)
     eligible = physical if any(physical) else [True] * len(models)
-    i, best = choose(models, results, eligible)
+    i, best = selection.choose_candidate(results, [c.rank for c in models], eligible)
     repeated = tuple(over_periods(c, count) for c in models)
     why = reason(models, results, i, best, eligible)
     return Selection(models, results, physical, repeated, models[i], models[best], why)
@@ -97,18 +97,12 @@ def better(fixed: Selection, searched: Selection | None) -> Selection:
     i = min((place[of.chosen.name] for of in both), key=lambda k: results[k].score)
     eligible = physical if physical[i] else (True,) * len(candidates)
     if not physical[i]:
-        free = [of.candidates[choose(of.candidates, of.results, [True] * len(of.results))[0]] for of in both]
+        ranked = [(of, [c.rank for c in of.candidates]) for of in both]
+        free = [of.candidates[selection.choose_candidate(of.results, r, [True] * len(r))[0]] for of, r in ranked]
         i = min((place[c.name] for c in free), key=lambda k: results[k].score)
     best = min(np.flatnonzero(eligible).tolist(), key=lambda k: results[k].score)
     chosen, why = candidates[i]._replace(variant=CHOSEN), reason(candidates, results, i, best, eligible)
     return Selection(candidates, results, physical, repeated, chosen, candidates[best], why)
-
-
-def choose(
-    candidates: Sequence[Candidate], results: Sequence[CrossValidation], eligible: Sequence[bool]
-) -> tuple[int, int]:
-    """Indices of the chosen candidate, of the lowest rank that is not clearly worse than the best, and of the best."""
-    return selection.choose_candidate(results, [c.rank for c in candidates], eligible)
 
 
 def over_periods(candidate: Candidate, count: int) -> tuple[float, float]:

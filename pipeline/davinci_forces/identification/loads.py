@@ -9,6 +9,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact import weighing
 from davinci_forces.maths.contact.weighing import PARTS, Rows, error_between
 from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.kinematics import remote_centre, tip
 from davinci_forces.maths.periods.period import refine
 from davinci_forces.maths.periods.repetition import harmonics_of, repetition
 from davinci_forces.maths.periods.shift import circular, straight
@@ -63,7 +64,7 @@ def loads_per_kilogram(
 ) -> tuple[Array, Array]:
     """Joint effort of a kilogram (N, n) at a position on a joint or link, or at the tip, and at its mirror position."""
     names = [joint.name for joint in robot.joints]
-    place = weighing.tip_position(chain, len(names)) if position is None else np.array(position)
+    place = tip(chain, np.zeros(len(names))) - remote_centre(chain) if position is None else np.array(position)
     link = moves_with or chain.links[int(chain.body[chain.names.index(chain.tip)]) - 1]
     if link in names:  # a joint, with which a link moves
         link = weighing.moved_with(chain, names.index(link))

@@ -29,16 +29,15 @@ def left_out(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict a joint of an identification log by refits without that log, or without parts of a single log."""
     model, prior = independent(joint), known_of(joint)
+    part = motion if average is None else motion.select(whole_periods(motion.t, average))
+    scorer = Scorer(part, is_evaluated(part), lowpass, None if average is None else average.sigma_tau_white)
     if refits:
-        yield from without_the_log(motion, average, refits, model, lowpass)
+        yield from without_the_log(part, scorer, refits, model)
         return
     if average is None:
-        part, scheme, path, white = motion, "leave a segment out", ANOTHER_PATH, None
-        predict = without_a_segment(motion, model, prior, lowpass)
+        scheme, path, predict = "leave a segment out", ANOTHER_PATH, without_a_segment(motion, model, prior, lowpass)
     else:
-        part, scheme, path = motion.select(whole_periods(motion.t, average)), "leave one period out", SAME_PATH
-        predict, white = without_a_period(part, average, model, prior), average.sigma_tau_white
-    scorer = Scorer(part, is_evaluated(part), lowpass, white)
+        scheme, path, predict = "leave one period out", SAME_PATH, without_a_period(part, average, model, prior)
     for name in ESTIMATORS:
         try:
             yield scorer.score(model.name, name, scheme, path, predict(estimator(name)))
@@ -48,15 +47,13 @@ def left_out(
 
 
 def without_the_log(
-    motion: Motion, average: Trajectory | None, cross_fits: Iterable[CrossFit], model: IndependentJoint, lowpass: float
+    part: Motion, scorer: Scorer, cross_fits: Iterable[CrossFit], model: IndependentJoint
 ) -> Iterator[Prediction]:
-    """Predict a log from fits to other identification logs."""
-    part = motion if average is None else motion.select(whole_periods(motion.t, average))
-    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white if average else None)
+    """Predict the periods of a log, or all of it, from fits to other identification logs."""
     along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
-        rows = [row for row, names in enumerate(left_out) if motion.log in names]
+        rows = [row for row, names in enumerate(left_out) if part.log in names]
         if rows:
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"

@@ -46,11 +46,7 @@ def _values(column: pa.ChunkedArray, dtype: type[Number]) -> NDArray[Number]:
 
 
 class NotANumber(ValueError):
-    """The cell at (row, column), counted from 0, is not a number."""
-
-    def __init__(self, row: int, column: int, cell: bytes) -> None:
-        super().__init__(row, column, cell)
-        self.row, self.column, self.cell = row, column, cell
+    """The row and the column, counted from 0, of a cell that is not a number, and the cell."""
 
 
 @dataclass(frozen=True)

@@ -133,9 +133,8 @@ def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
     F = fourier.observation(joint.terms, series)
     t = np.linspace(0.0, series.period, 401)
     q, dq, ddq = fourier.motion(series, t)
-    ranges = zip(fourier.ranges(series), joint.limits.motion, strict=True)
-    excess = [float(max(low - least, largest - high, 0.0)) for (least, largest), (low, high) in ranges]
-    excesses = dict(zip(("excess_q", "excess_dq", "excess_ddq"), excess, strict=True))
+    ranges = zip(("excess_q", "excess_dq", "excess_ddq"), fourier.ranges(series), joint.limits.motion, strict=True)
+    excesses = {name: float(max(low - least, most - high, 0.0)) for name, (least, most), (low, high) in ranges}
     return Excitation(
         joint=joint.name,
         source=source,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import ekf, kalman
-from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 from davinci_forces.filters.response import MAX_LOG_CHANGE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import TRANSIENT
@@ -29,10 +29,10 @@ class Noise(NamedTuple):
     phi: tuple[float, float]  # of position and velocity
 
 
-def innovations(recording: FilterInput, noise: Noise) -> tuple[Array, Array]:
-    """Compute the innovations of position and velocity (N,)."""
+def track(recording: FilterInput, noise: Noise) -> Tracked:
+    """Filter a recording."""
     [(_, tracked)] = kalman.run_blocks(recording, states(recording, noise))
-    return tracked.innovation_q, tracked.innovation_dq
+    return tracked
 
 
 def log_likelihood(recording: FilterInput, noise: Noise) -> float:

@@ -110,15 +110,12 @@ class Subject:
         noise, pieces_q, pieces_dq = self.likeliest_noise(without), [], []
         for run in self.runs(free):
             part = self.run_under_model(without).part(run)
-            if COLOUR in without:
-                i_q, i_dq = coloured.innovations(part, noise)
-            else:
-                tracked = tracker(DEFAULT)(part, noise.white)
-                i_q, i_dq = tracked.innovation_q, tracked.innovation_dq
-            for piece in runs(is_past_transient(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
+            tracked = coloured.track(part, noise) if COLOUR in without else tracker(DEFAULT)(part, noise.white)
+            t = np.asarray(np.arange(part.samples) * part.T_s, np.float64)
+            for piece in runs(is_past_transient(t) & moving[run]):
                 if piece.stop - piece.start > LAGS:
-                    pieces_q.append(i_q[piece])
-                    pieces_dq.append(i_dq[piece])
+                    pieces_q.append(tracked.innovation_q[piece])
+                    pieces_dq.append(tracked.innovation_dq[piece])
         return pieces_q, pieces_dq
 
     def runs(self, free: Booleans) -> list[slice]:

@@ -91,11 +91,12 @@ class Reading:
         try:
             return parse_carefully(run.block, run.width, run.layout.file.separator, self._columns(run))
         except NotANumber as bad:
-            text = decode(bad.cell)
+            row, column, cell = bad.args
+            text = decode(cell)
             shown = repr(text if len(text) <= 40 else f"{text[:37]}...")
-            where = f"{shown} in column {bad.column} ({run.name(bad.column) or 'x'})"
+            where = f"{shown} in column {column} ({run.name(column) or 'x'})"
             what = "is not a number; correct the cell, or take the row out of the log"
-            raise BadLog(f"{self.log.path}:{run.line(bad.row)}: {where} {what}") from None
+            raise BadLog(f"{self.log.path}:{run.line(row)}: {where} {what}") from None
 
     def _columns_of(self, run: Run, channels: Sequence[str]) -> dict[int, str]:
         names = ((i, run.name(i)) for i in range(run.width - run.commented))

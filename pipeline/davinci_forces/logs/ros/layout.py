@@ -77,13 +77,11 @@ def numbers_at(place: Place, table: NDArray[np.uint8]) -> Array:
 def stamps_at(place: Place, table: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Times [ns] at a place of messages, one in each row of `table`."""
     values = _view(place, table)
-    stamps: NDArray[np.int64] = values["sec"].astype(np.int64) * 10**9 + values["nanosec"]
-    return stamps
+    return np.asarray(values["sec"].astype(np.int64) * 10**9 + values["nanosec"])
 
 
 def _view(place: Place, table: NDArray[np.uint8]) -> NDArray[Any]:
-    values: NDArray[Any] = table[:, place.offset : place.offset + place.dtype.itemsize].view(place.dtype)[:, 0]
-    return values
+    return np.asarray(table[:, place.offset : place.offset + place.dtype.itemsize].view(place.dtype)[:, 0])
 
 
 def layout_of(content: bytes, kind: str, types: Any, ros1: bool, first: Layout | None = None) -> Layout:

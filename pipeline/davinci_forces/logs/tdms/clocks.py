@@ -30,7 +30,9 @@ def set_clocks(log: Log, sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
         return {}
     log.lent = {n: c for n, c in clock_of.items() if c and sampled[c].timeline and not sampled[n].timeline}
     named = dict(zip(clocks, _names(clocks, log.channels, sampled), strict=True))
-    longest = _longest(clock_of, sampled)
+    timed = [(timeline, clock) for name, clock in clock_of.items() if (timeline := sampled[name].timeline)]
+    timed.sort(key=lambda pair: -pair[0].rows)
+    longest = {clock: timeline for timeline, clock in reversed(timed)}  # of equally long ones the first
     derived = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
     main = clocks[0] if "" not in clocks else ""  # of the log; channels without a clock would wrongly inherit it
     log.time = named[main] if main else ""
@@ -69,15 +71,6 @@ def _names(clocks: Sequence[str], channels: Sequence[Channel], sampled: Mapping[
         names = ["time" if name else "" for name in names]
     free = iter(unique([name for name in names if name], [channel.name for channel in channels]))
     return [next(free) if name else clock for name, clock in zip(names, clocks, strict=True)]
-
-
-def _longest(clock_of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
-    longest: dict[str, Timeline] = {}
-    for name, clock in clock_of.items():
-        timeline = sampled[name].timeline
-        if timeline and (clock not in longest or timeline.rows > longest[clock].rows):
-            longest[clock] = timeline
-    return longest
 
 
 class Words(NamedTuple):

@@ -40,6 +40,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, runs
 from davinci_forces.maths.contact.unexplained import SIGMA
 from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.maths.uncertainty.bootstrap import rms
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
 NARROWER = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of `TIP_REACH`: half of the time of means that may show a peak
@@ -71,19 +72,18 @@ class Event(NamedTuple):
 def free_motion_statistics(tau_ext: Array, free: Booleans, rate: float) -> FreeMotionStatistics:
     """Statistics of an effort (N,) at `rate` [Hz] at its `free` samples (N,)."""
     x, upwards = tau_ext[free], (tau_ext[:-1] < 0.0) & (tau_ext[1:] >= 0.0) & free[:-1] & free[1:]
-    rms = float(np.sqrt(np.mean(x**2)))
-    return FreeMotionStatistics(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
+    return FreeMotionStatistics(rms(x), float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
 
 
-def alarm_level(rms: float, largest: float, crossings: float) -> float:
+def alarm_level(size: float, largest: float, crossings: float) -> float:
     """The effort level that free motion with these `FreeMotionStatistics` crosses at most once in ten minutes."""
-    return max(largest, rms * float(np.sqrt(2.0 * np.log(max(crossings / FALSE_ALARMS, 1.0)))))
+    return max(largest, size * float(np.sqrt(2.0 * np.log(max(crossings / FALSE_ALARMS, 1.0)))))
 
 
 def typical_alarm_level(tau_ext: Array, free: Booleans, rate: float) -> float:
     """The alarm level of an effort (N,) at `rate` [Hz] by the median of `free` samples (N,), whatever a few are."""
-    rms = SIGMA * float(np.median(np.abs(tau_ext[free])))
-    return alarm_level(rms, 0.0, free_motion_statistics(tau_ext, free, rate).crossings)
+    size = SIGMA * float(np.median(np.abs(tau_ext[free])))
+    return alarm_level(size, 0.0, free_motion_statistics(tau_ext, free, rate).crossings)
 
 
 def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> list[Event]:
@@ -270,14 +270,14 @@ def moving_mean(x: Array, length: int) -> Array:
 
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
     """Root mean square of means over `length` free samples, or over the longest run; NaN without free samples."""
-    return _size([moving_mean(run, length) for run, length in _runs(tau_ext, free, length)])
+    return rms(np.concatenate([[], *(moving_mean(run, length) for run, length in _runs(tau_ext, free, length))]))
 
 
 def largest_size(tau_ext: Array, free: Booleans, length: int, of: int = 1) -> float:
     """Root mean square of the largest of `length` consecutive samples in free space, or of means `of` as many."""
     parts = [moving_mean(run, of) for run, used in _runs(tau_ext, free, length + of - 1) if used >= of]
     windows = (np.array_split(part, max(len(part) // length, 1)) for part in parts)
-    return _size([np.array([np.abs(window).max() for window in of_run]) for of_run in windows])
+    return rms(np.array([np.abs(window).max() for of_run in windows for window in of_run]))
 
 
 def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]]:
@@ -285,7 +285,3 @@ def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]
     parts = [tau_ext[run] for run in runs(free)]
     length = min(length, max(map(len, parts), default=0))
     return [(part, length) for part in parts if len(part) >= length > 0]
-
-
-def _size(parts: list[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")

@@ -22,7 +22,7 @@ from scipy.special import chdtrc
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, tip, to_base
+from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, of_left_out
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
@@ -212,8 +212,3 @@ def unit_load(chain: Chain, link: str, position: ArrayLike, q: Array, dq: Array,
     masses, centres = np.zeros(L), np.zeros((L, 3))
     masses[which], centres[which] = 1.0, np.linalg.solve(pose, point)[:3]  # in the link's frame, whatever q
     return inverse_dynamics(chain, Bodies(masses, centres, np.zeros((L, 3, 3)), np.zeros(L, np.int64)), q, dq, ddq)
-
-
-def tip_position(chain: Chain, n: int) -> Array:
-    """The tip's position (3,) [m] from the remote centre, in base axes, with the first n coordinates at 0."""
-    return np.asarray(tip(chain, np.zeros(n)) - remote_centre(chain))

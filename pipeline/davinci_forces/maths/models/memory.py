@@ -66,15 +66,11 @@ def pieces(model: Model, motion: ArmMotion, beside: int = 0, samples: int = 0) -
         motion = motion._replace(memory={key: deflection(motion, *key) for key in model.displacements})
     for start in range(0, N, samples):
         stop, first = min(start + samples, N), max(start - beside, 0)
-        inside = slice(start - first, stop - first)
-        yield Piece(select_samples(motion, slice(first, min(stop + beside, N))), inside, slice(start, stop))
-
-
-def select_samples(motion: ArmMotion, which: slice) -> ArmMotion:
-    """Select samples of a motion."""
-    columns = {name: getattr(motion, name)[which] for name in ("q", "dq", "ddq", "segment")}
-    memory = {key: (z[which], valid[which]) for key, (z, valid) in motion.memory.items()}
-    return motion._replace(**columns, memory=memory)
+        which = slice(first, min(stop + beside, N))
+        columns = {name: getattr(motion, name)[which] for name in ("q", "dq", "ddq", "segment")}
+        memory = {key: (z[which], valid[which]) for key, (z, valid) in motion.memory.items()}
+        part = motion._replace(**columns, memory=memory)
+        yield Piece(part, slice(start - first, stop - first), slice(start, stop))
 
 
 def efforts(model: Model, theta: Array, motion: ArmMotion, which: Integers | None = None) -> Array:

@@ -94,6 +94,11 @@ def model_error(slow: Array, noise: float) -> tuple[float, float]:
     return root(float(np.mean(squares)) - noise**2, spread)
 
 
+def rms(x: Array) -> float:
+    """Root mean square of samples (N,); NaN without any."""
+    return float(np.sqrt(np.mean(x**2))) if len(x) else float("nan")
+
+
 def root_mean_square(x: Array, scale: Array | None = None) -> tuple[float, float]:
     """Root mean square of samples (N,), over that of a scale (N,) if there is one, and its standard error.
 

@@ -7,9 +7,9 @@ import numpy as np
 from davinci_forces.filters import diverges, filter_parts
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
-from davinci_forces.maths.arrays import Array, evenly
+from davinci_forces.maths.arrays import evenly
 from davinci_forces.maths.signals.windows import MIN_FREE_SAMPLES, free_smoothed
-from davinci_forces.maths.uncertainty.bootstrap import of_left_out
+from davinci_forces.maths.uncertainty.bootstrap import of_left_out, rms
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, MIN_LOGS_BAND, count_uncorrelated
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel, by_name
 from davinci_forces.records.forces import SMOOTHER
@@ -57,8 +57,7 @@ def gather(motions: Iterable[FreeMotion]) -> Iterator[ErrorBand]:
         logs = np.repeat(np.arange(len(used)), lengths)
         errors = columns["tau_ext_smooth"]
         parts = logs if len(used) >= MIN_LOGS_BAND else logs * LOG_BLOCKS + columns["block"]
-        numbers = np.unique(parts)
-        left_out = [[rms(errors[parts != number])] for number in numbers] if len(numbers) > 1 else [[np.nan]]
+        left_out = [[rms(errors[parts != number])] for number in np.unique(parts)]
         yield ErrorBand(
             joint=joint,
             band_rms=rms(errors),
@@ -67,8 +66,3 @@ def gather(motions: Iterable[FreeMotion]) -> Iterator[ErrorBand]:
             path_of=np.repeat(np.array([motion.path for motion in used], object), lengths),
             **columns,
         )
-
-
-def rms(errors: Array) -> float:
-    """Root mean square of errors (C,)."""
-    return float(np.sqrt(np.mean(errors**2)))

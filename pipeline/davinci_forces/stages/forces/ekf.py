@@ -8,10 +8,10 @@ from davinci_forces.filters import DEFAULT, diverges, filter_blocks, filter_part
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.filters.problem import Tracked, filter_inputs
 from davinci_forces.filters.response import lag_error, noise_model, rise, rounding_error
-from davinci_forces.maths.arrays import BLOCK_SAMPLES, Array, Booleans
+from davinci_forces.maths.arrays import BLOCK_SAMPLES, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
-from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, root_mean_square
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, rms, root_mean_square
 from davinci_forces.maths.uncertainty.error_band import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -104,11 +104,6 @@ def numbers_of(estimate: Tracked, offset: DayOffset, converged: Booleans, free: 
         "nis_mean_std": error_of_pooled_mean(nis),
         "filter_part": rms(estimate.tau_ext_std[converged]),
     }
-
-
-def rms(x: Array) -> float:
-    """Root mean square; NaN of an empty array."""
-    return float(np.sqrt(np.mean(x**2))) if len(x) else float("nan")
 
 
 def divergence_warning(model: JointModel, nis: float) -> Diagnostic:

@@ -30,6 +30,7 @@ MIN_PROBABILITY = 0.01  # p-value of a test, above which a signal is called whit
 OUTSIDE_MOTION = "rests and transients"  # what is left out where no contact is known
 UNKNOWN_CONTACT = "; the study states no contact windows, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
+PROBABILITIES = ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq")
 
 
 def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
@@ -201,9 +202,6 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
         without=np.array([" + ".join(t.without).replace(CONTACT, omitted) or "nothing" for t in trials], object),
         explains=np.array([t in causes.explaining for t in trials], np.int64),
         left=np.array([t.tested for t in trials]),
-        ljung_box_p_q=np.array([t.ljung_box[0] for t in trials]),
-        ljung_box_p_dq=np.array([t.ljung_box[1] for t in trials]),
-        periodogram_p_q=np.array([t.periodogram[0] for t in trials]),
-        periodogram_p_dq=np.array([t.periodogram[1] for t in trials]),
+        **dict(zip(PROBABILITIES, np.array([(*t.ljung_box, *t.periodogram) for t in trials]).T, strict=True)),
         walk=np.array([t.walk for t in trials]),
     )

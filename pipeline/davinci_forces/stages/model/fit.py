@@ -271,9 +271,7 @@ def fit_record(
         r2_std=(1.0 - r2) * mse_std / (mse or 1.0),
         condition=float(np.linalg.cond(regression.Phi)),
         correlated_lags=round(estimate.standard_errors.lags),
-        theta_std_noise=estimate.standard_errors.noise,
-        theta_std_model=estimate.standard_errors.model,
-        theta_std_classical=estimate.standard_errors.classical,
+        **{f"theta_std_{of}": getattr(estimate.standard_errors, of) for of in ("noise", "model", "classical")},
         **parameter_columns(model),
     )
 

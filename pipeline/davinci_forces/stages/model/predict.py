@@ -131,9 +131,7 @@ def apply(
     described = [joint for joint in along.joints if identified.fits_of(joint)]
     used = {joint: identified.fit_along(joint, fit, along.joints_on_clock(joint)) for joint in described}
     periods = {average.joint: average for average in averages}
-    refits = (
-        refits_of(predictions, {joint: joint_fit for joint, (joint_fit, _) in used.items()}, fit) if is_fitted else {}
-    )
+    refits = refits_of(predictions if is_fitted else (), {joint: f for joint, (f, _) in used.items()}, fit)
     for motion in motions:
         about, name = f"{motion.log}.{motion.joint}.model", f"{motion.log}/{motion.joint}"
         if motion.joint not in used:

@@ -191,12 +191,9 @@ def tip_contacts(
     """The largest force in each window in which the force is known."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     size = np.where(np.isnan(f[:, 0]), -1.0, np.linalg.norm(f, axis=1))
-    peaks = []
-    for start, end, is_stated in windows:
-        inside = np.where((force.t >= start) & (force.t <= end), size, -1.0)
-        k = int(np.argmax(inside))
-        if inside[k] > 0.0:
-            peaks.append((start, end, is_stated, k))
+    insides = (np.where((force.t >= start) & (force.t <= end), size, -1.0) for start, end, _ in windows)
+    pairs = zip(windows, insides, strict=True)
+    peaks = [(*window, int(inside.argmax())) for window, inside in pairs if inside.max() > 0.0]
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
