@@ -13,9 +13,9 @@ def test_a_value_that_repeats_and_then_jumps_is_stuck_from_its_first_to_its_last
     x = np.sin(T)
     stuck = x.copy()
     stuck[300:400] = stuck[300]
-    [one] = find_stuck(T, stuck)
-    assert (one.start, one.end) == (T[300], T[399])
-    assert one.jump == pytest.approx(x[400] - x[300])
+    [(start, end, jump)] = find_stuck(T, stuck)
+    assert (start, end) == (T[300], T[399])
+    assert jump == pytest.approx(x[400] - x[300])
     assert find_stuck(T, x) == []
 
 

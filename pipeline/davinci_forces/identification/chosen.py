@@ -194,18 +194,11 @@ def scores(part: CandidatePart, theta: Array) -> dict[str, float]:
     return {"mse": mse, "mse_std": std, "r2": 1.0 - unexplained, "r2_std": unexplained * std / (mse or 1.0)}
 
 
-class ConsistentFit(NamedTuple):
-    """Parameters that a mechanism can have, and the error of each effort (m,) with them and with free ones."""
-
-    estimate: BlockEstimate
-    rmse: Array  # (m,)
-    rmse_free: Array  # (m,)
-    excess: float  # of the criterion over its minimum, as a share of the effort's square
-
-
-def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
+def fit_consistent(part: CandidatePart, free: BlockEstimate) -> tuple[BlockEstimate, Array, Array, float]:
     """Fit a candidate's parameters within those that a mechanism can have, to the equations of all logs.
 
+    Returns also the error of each effort (m,) with them and with free ones, and the excess of the criterion over its
+    minimum, as a share of the effort's square.
     The standard errors remain those of the candidate, as `consistent` keeps those of least squares.  A joint by itself
     has at least the inertia that causes `MIN_INERTIA_SHARE` of its effort, because a filter divides by it.
     Raises NotIdentifiable if the conic program is not solved.
@@ -221,7 +214,7 @@ def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
         fit = fit._replace(theta=theta, excess=float(R.excess(theta)) / size**2)
     estimate = free._replace(theta=fit.theta, **scores(part, fit.theta))  # type: ignore[arg-type]
     rmse, rmse_free = (np.sqrt(equations.errors(theta)[0] / samples) for theta in (fit.theta, free.theta))
-    return ConsistentFit(estimate, rmse, rmse_free, fit.excess)
+    return estimate, rmse, rmse_free, fit.excess
 
 
 def factor(equations: Equations, ridge: Ridge) -> Triangle:

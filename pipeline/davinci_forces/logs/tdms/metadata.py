@@ -103,10 +103,8 @@ class _Cursor:
 
     def moment(self) -> datetime | None:
         """Read a time stamp; None beyond the range of dates."""
-        parts = ("Q", "q") if self.order == "<" else ("q", "Q")
-        first, second = self.number(parts[0]), self.number(parts[1])
-        fraction, seconds = (first, second) if self.order == "<" else (second, first)
-        return moment(EPOCH, seconds, round(fraction / 2**64 * 1e6))
+        parts = {code: self.number(code) for code in ("Qq" if self.order == "<" else "qQ")}  # fraction and seconds
+        return moment(EPOCH, parts["q"], round(parts["Q"] / 2**64 * 1e6))
 
     def samples(self, header: int) -> Samples:
         kind, dimension, count = self.number("I"), self.number("I"), self.number("Q")

@@ -211,5 +211,4 @@ class _Reading:
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         if not self.rows:
             say("the file holds no complete row")
-        for remark in lines.remarks():
-            say(remark)
+        self.log.warnings += lines.remarks()

@@ -4,7 +4,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -52,15 +51,6 @@ class Dialect:
         return len(self.names) > 1 and not self.names[-1]
 
 
-class Header(NamedTuple):
-    """Names and units of all columns, empty where there are none."""
-
-    names: list[str]
-    aliases: list[str]  # names as written, where these hold the unit after a slash
-    units: list[str]
-    preamble: list[str]  # the other lines
-
-
 def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     """Find the format of a file from its first lines; raises BadContent if marks or columns have two readings."""
     lines = _unfolded(lines[:SAMPLE_LINES])
@@ -80,18 +70,20 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     first = _first_row(lines, delimiter, kinds, NUMBERS[decimal], stamps, options)
     if options.header is None and _are_numbers_of_columns(split_cells(lines[first], delimiter), columns, decimal):
         first, options = first + 1, replace(options, header=True)
-    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, options)
+    above = [line for line in lines[:first] if line.strip()]
+    names, aliases, stated, preamble = read_header(above, columns, delimiter, options)
     whole = [row for line in lines[first:] if len(row := split_cells(line, delimiter)) == len(kinds)]
     from_first = {i: stamp.from_first([row[i] for row in whole]) for i, stamp in stamps.items()}
     stamps = {i: stamp for i, stamp in from_first.items() if stamp}  # a column without a valid first date is text
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
-    stated = zip(header.units, columns, kinds, strict=True)
-    units = [unit or (_counted_unit(column) if kind == "number" else "") for unit, column, kind in stated]
-    described = zip(unique(header.names), units, kinds, _aliases(header, columns), strict=True)
-    channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
+    described = zip(unique(names), stated, columns, kinds, _aliases(names, aliases, columns), strict=True)
+    channels = tuple(
+        Channel(name, unit or (_counted_unit(column) if kind == "number" else ""), kind, alias=alias)
+        for name, unit, column, kind, alias in described
+    )
     renamed = (
         f"more than one column is called {written!r}; column {i} is read as {channel.name!r}"
-        for i, (written, channel) in enumerate(zip(header.names, channels, strict=True))
+        for i, (written, channel) in enumerate(zip(names, channels, strict=True))
         if written and written != channel.name
     )
     unread = {
@@ -101,19 +93,19 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     }
     return Dialect(
         delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first,
-        header_lines=frozenset(line.strip() for line in lines[:first] if line.strip()),
-        names=tuple(header.names) if any(header.names) else (), preamble=tuple(header.preamble), framed=framed,
+        header_lines=frozenset(line.strip() for line in above),
+        names=tuple(names) if any(names) else (), preamble=tuple(preamble), framed=framed,
         quoted=any('"' in row for row in body), marked=bool(COMMENT.match(body[0])),
         unread=unread, remarks=(*renamed, *unread.values()),
     )  # fmt: skip
 
 
-def _aliases(header: Header, columns: Sequence[Sequence[str]]) -> Iterator[str]:
+def _aliases(names: Sequence[str], written: Sequence[str], columns: Sequence[Sequence[str]]) -> Iterator[str]:
     """Aliases, with the joint that another column names, as `rostopic echo -p` does: name0 holds that of position0."""
-    matches = [re.fullmatch(r"(|.*[./])(name|position|velocity|effort)(\d+)", name) for name in header.names]
+    matches = [re.fullmatch(r"(|.*[./])(name|position|velocity|effort)(\d+)", name) for name in names]
     joints = {(m[1], m[3]): cells[0] for m, cells in zip(matches, columns, strict=True)
               if m and m[2] == "name" and len({*cells}) == 1}  # fmt: skip
-    for m, alias in zip(matches, header.aliases, strict=True):
+    for m, alias in zip(matches, written, strict=True):
         joint = joints.get((m[1], m[3]), "") if m and m[2] != "name" else ""
         yield f"{m[1]}{m[2]}[{joint}]" if m and joint else alias
 
@@ -207,8 +199,14 @@ def _why_text(cells: Sequence[str]) -> str:
     return ""
 
 
-def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options) -> Header:
-    """Read the lines above `columns` of cells; raises BadContent if the last has other columns, or numbers and text."""
+def read_header(
+    lines: Sequence[str], columns: Sequence[Sequence[str]], delimiter: str, options: Options
+) -> tuple[list[str], list[str], list[str], list[str]]:
+    """Read names, aliases and units, "" where there are none, from the lines above `columns`, and the other lines.
+
+    An alias is a name as it is written, where that holds the unit after a slash.
+    Raises BadContent if the last line has other columns, or numbers and text.
+    """
     width = len(columns)
     rows = [_fitted(line, columns, delimiter) for line in lines]
     fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
@@ -239,7 +237,7 @@ def read_header(lines: Sequence[str], columns: Sequence[Sequence[str]], delimite
     stems = [stem for stem, _ in ratios]
     aliases = [name if name != stem else "" for name, stem in zip(names, stems, strict=True)]
     stated = [unit or ratio[1] for unit, ratio in zip(units, ratios, strict=True)]
-    return Header(stems, aliases, stated, preamble)
+    return stems, aliases, stated, preamble
 
 
 def _fitted(line: str, columns: Sequence[Sequence[str]], delimiter: str) -> list[str]:

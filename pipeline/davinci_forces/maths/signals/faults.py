@@ -5,8 +5,6 @@ at its largest value, of either sign.  A step is a change that the motion does n
 a model, as the controller starts or stops.  Across a step of the clock the motion goes on as after one sample.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, row_blocks, runs
@@ -27,16 +25,11 @@ SAME_PLACE = 0.6  # of the largest travel between samples; half a sample's trave
 MIN_TRAVEL = 10.0  # a motion over the time of a gap is evidence from this many standard errors on
 
 
-class Stuck(NamedTuple):
-    """The time in which a value did not change [s], and the jump that ended it."""
+def find_stuck(t: Array, x: Array) -> list[tuple[float, float, float]]:
+    """Find where a signal (N,) at times (N,) [s] repeats a value and then jumps, unlike a joint that was at rest.
 
-    start: float
-    end: float
-    jump: float
-
-
-def find_stuck(t: Array, x: Array) -> list[Stuck]:
-    """Find where a signal (N,) at times (N,) [s] repeats a value and then jumps, unlike a joint that was at rest."""
+    Returns the start and the end [s] of each time in which the value did not change, and the jump that ended it.
+    """
     step = np.abs(np.diff(x))
     repeats = [(run.start, run.stop) for run in runs(step == 0.0)]  # first and last sample at one value
     still = [(a, b) for a, b in repeats if t[b] - t[a] >= MIN_TIME_STUCK and b < len(step)]
@@ -47,7 +40,7 @@ def find_stuck(t: Array, x: Array) -> list[Stuck]:
     # The jumps themselves must not raise the usual step.
     usual = min(usual, float(np.median(moving)) * MIN_JUMP_RATIO)
     jumping = [(a, b) for a, b in still if step[b] > MIN_JUMP_RATIO * usual]
-    return [Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in jumping]
+    return [(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in jumping]
 
 
 def count_saturated(x: Array) -> int:

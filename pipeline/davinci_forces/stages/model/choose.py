@@ -228,15 +228,15 @@ def consistent_fits(
     for part, free in estimates:
         model = part.model
         try:
-            consistent = fit_consistent(part, free)
+            estimate, rmse, rmse_free, excess = fit_consistent(part, free)
         except (NotIdentifiable, np.linalg.LinAlgError) as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
             yield diagnostic("choose", model.group, "note", message)
             continue
-        yield fit_record(candidate, "consistent", part, consistent.estimate)
-        if consistent.excess > NEGLIGIBLE_EXCESS:
+        yield fit_record(candidate, "consistent", part, estimate)
+        if excess > NEGLIGIBLE_EXCESS:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
-            errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
+            errors = zip(model.efforts, rmse, rmse_free, units, strict=True)
             costs = ", ".join(f"{x:.3g} {unit} of {j} ({100 * (x / y - 1):+.2g} %)" for j, x, y, unit in errors)
             message = f"{model.group}: no mechanism has the parameters of the fit {name}"
             follows = f"to simulate, use {candidate.variant}.consistent, whose error where fitted is {costs}"

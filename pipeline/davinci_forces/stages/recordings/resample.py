@@ -213,10 +213,10 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
 def faults(recording: Recording) -> Iterator[str]:
     """State where a position was stuck or jumps, or a drive was at its limit."""
     name, q = f"{recording.log}/{recording.joint}", recording.q
-    for stop in find_stuck(recording.t, q):
+    for start, end, jump in find_stuck(recording.t, q):
         yield (
-            f"{name}: the position stands still from {stop.start:.3f} to {stop.end:.3f} s and then jumps by "
-            f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
+            f"{name}: the position stands still from {start:.3f} to {end:.3f} s and then jumps by "
+            f"{jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
     step = np.diff(q)
     jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL * np.quantile(np.abs(step), 0.99)))
