@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from davinci_forces.filters.response import Response
 from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, free_space
 from davinci_forces.records import Choice, Diagnostic, FilterNoise, Fit, JointModel, Signal
 from davinci_forces.stages.forces import benchmark
@@ -102,6 +101,6 @@ def test_filters_are_compared_from_a_hundred_samples_of_free_motion_on(samples, 
 
 @pytest.mark.parametrize(("share", "warnings"), [(0.49, 1), (0.51, 0)])
 def test_a_filter_that_shows_less_than_half_of_a_push_is_warned_of_once(share, warnings, monkeypatch):
-    monkeypatch.setattr(benchmark, "response", lambda *_: Response(share, 0.1))
+    monkeypatch.setattr(benchmark, "response", lambda *_: (share, 0.1))
     texts = [text for record in compared() if isinstance(record, Diagnostic) for text in record.text]
     assert len([text for text in texts if f"the filter shows only {share:.0%} of a push" in text]) == warnings

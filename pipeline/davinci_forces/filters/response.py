@@ -11,7 +11,6 @@ the setting `delay` after the peak of the push.  `q_tau` of a `NoiseModel` is th
 
 from collections.abc import Sequence
 from functools import lru_cache, partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -36,29 +35,24 @@ MAX_LOG_CHANGE = np.log(1e3)  # largest change of a standard deviation's logarit
 MAX_SAMPLES_TUNING = 20_000  # at most this number of each recording's samples is used
 
 
-class Response(NamedTuple):
-    """The response of a filter to a push."""
-
-    share: float  # estimated peak / peak of the push
-    delay: float  # [s] from the peak of the push to the estimated peak
-
-
 def half_sine(t: Array, start: float) -> Array:
     """Return a push of peak 1 that begins at `start` [s], at the times t (N,) [s]."""
     since = (t - start) / DURATION
     return np.where((since >= 0.0) & (since <= 1.0), np.sin(np.pi * since), 0.0)
 
 
-def response(change: Array, t: Array, start: float, peak: float) -> Response:
-    """Measure the response: `change` (N,) is the estimate with a push of this `peak`, minus the estimate without it."""
+def response(change: Array, t: Array, start: float, peak: float) -> tuple[float, float]:
+    """The estimated peak over that of a push, and how late [s] it is, by the `change` (N,) of the estimate by it."""
     near = (t >= start) & (t <= start + 2.0 * DURATION)
     shares = change[near] / peak
     k = int(np.argmax(shares))
-    return Response(float(shares[k]), float(t[near][k] - start - 0.5 * DURATION))
+    return float(shares[k]), float(t[near][k] - start - 0.5 * DURATION)
 
 
-def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> Response:
-    """Compute the response of a filter to a push on a joint at rest, where the filter is linear."""
+def push_response_at_rest(
+    track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel
+) -> tuple[float, float]:
+    """Compute the `response` of a filter to a push on a joint at rest, where the filter is linear."""
     t = np.asarray(T_s * np.arange(round((BEFORE + DURATION + AFTER) / T_s) + 1), np.float64)
     return response(track(joint_at_rest(inertia, viscous, half_sine(t, BEFORE), T_s), noise).tau_ext, t, BEFORE, 1.0)
 

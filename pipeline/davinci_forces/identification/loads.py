@@ -136,12 +136,12 @@ def subtract_tare(loads: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Loa
     if abs(period - tare_period) > MAX_PERIOD_DIFFERENCE * period:
         return [], f"repeats every {tare_period:.4g} s and not every {period:.4g} s (0: not at all)"
     q, q_tare = (np.stack([even_positions(load) for load in column], axis=1) for column in zip(*pairs, strict=True))
-    shift = circular(q, q_tare) if period else straight(q, q_tare)
-    if shift.apart.max() > MAX_TARE_DISTANCE:
-        worst = loads[int(shift.apart.argmax())].joint
-        distance = f"{shift.apart.max():.2g} of the standard deviation of {worst}"
+    samples, apart = circular(q, q_tare) if period else straight(q, q_tare)
+    if apart.max() > MAX_TARE_DISTANCE:
+        worst = loads[int(apart.argmax())].joint
+        distance = f"{apart.max():.2g} of the standard deviation of {worst}"
         return [], f"is not on the same path: at best it is off by {distance}, above {MAX_TARE_DISTANCE:g}"
-    return [subtract_joint_tare(*pair, shift.samples) for pair in pairs], ""
+    return [subtract_joint_tare(*pair, samples) for pair in pairs], ""
 
 
 def even_positions(load: Load) -> Array:

@@ -1,7 +1,6 @@
 """Align two recordings of one path in time."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,21 +11,17 @@ MIN_OVERLAP = 0.8  # of two recordings that do not repeat: share of the shorter 
 SAME_PATH = 0.95  # likeness above which two recordings follow the same path
 
 
-class Shift(NamedTuple):
-    """Delay of one recording against another, and the difference that remains."""
+def circular(q: Array, reference: Array) -> tuple[float, Array]:
+    """Shift in samples of a repeated period (K, J) against another of as many that minimises their difference.
 
-    samples: float
-    apart: Array  # (J,) root mean square of the difference, over the standard deviation
-
-
-def circular(q: Array, reference: Array) -> Shift:
-    """Shift of a repeated period (K, J) against another of as many samples that minimises their difference."""
+    Returns also what remains of that (J,): its root mean square over the standard deviation.
+    """
     spread = np.maximum(q.std(axis=0), 1e-300)
     spectra = np.conj(np.fft.rfft(q / spread, axis=0)) * np.fft.rfft(reference / spread, axis=0)
     products = np.fft.irfft(spectra.sum(axis=1), len(q))
     best = int(products.argmax())
     samples = best + vertex(*(-float(products[(best + d) % len(q)]) for d in (-1, 0, 1)))[0]
-    return Shift(samples, _apart(q, roll(reference, samples), spread))
+    return samples, _apart(q, roll(reference, samples), spread)
 
 
 def roll(x: Array, samples: float) -> Array:
@@ -36,8 +31,8 @@ def roll(x: Array, samples: float) -> Array:
     return np.asarray((1.0 - share) * np.roll(x, -whole, axis=0) + share * np.roll(x, -whole - 1, axis=0))
 
 
-def straight(q: Array, reference: Array) -> Shift:
-    """Shift in whole samples of a recording (N, J) against another (N', J), overlapping, with the least difference."""
+def straight(q: Array, reference: Array) -> tuple[float, Array]:
+    """The same in whole samples of a recording (N, J) against another (N', J), over the part that both cover."""
     spread = np.maximum(q.std(axis=0), 1e-300)
     a, b = q / spread, reference / spread
     N, M = len(a), len(b)
@@ -52,7 +47,7 @@ def straight(q: Array, reference: Array) -> Shift:
     difference = (power_a + power_b - 2.0 * products[lags % size]) / shared
     lag = int(lags[np.where(shared >= MIN_OVERLAP * min(N, M), difference, np.inf).argmin()])
     first, last = max(0, -lag), min(N, M - lag)
-    return Shift(float(lag), _apart(q[first:last], reference[first + lag : last + lag], spread))
+    return float(lag), _apart(q[first:last], reference[first + lag : last + lag], spread)
 
 
 def _apart(q: Array, reference: Array, spread: Array) -> Array:

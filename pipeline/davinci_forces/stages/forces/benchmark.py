@@ -60,15 +60,14 @@ def compare(
     del std  # of a long log, as the filter runs again
     pushed, start = add_push(model.t, parts, free, push)
     change = filter_parts(name, pushed, noise, ("tau_ext",)).tau_ext
-    shown = response(np.subtract(change, tau_ext, out=change), model.t, start, push)
-    if label == DEFAULT and shown.share < MIN_PUSH_SHARE:
-        message = f"{model.log}/{model.joint}: the filter shows only {shown.share:.0%} of a push of {DURATION:g} s"
-        yield diagnostic(
-            "benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; state a shorter delay in [settings]"
-        )
+    share, late = response(np.subtract(change, tau_ext, out=change), model.t, start, push)
+    if label == DEFAULT and share < MIN_PUSH_SHARE:
+        message = f"{model.log}/{model.joint}: the filter shows only {share:.0%} of a push of {DURATION:g} s"
+        text = f"{message}; state a shorter delay in [settings]"
+        yield diagnostic("benchmark", f"{model.log}.{model.joint}", "warning", text)
     yield Comparison.like(
-        space, model, filter=label, default=int(label == DEFAULT), push_peak=push, push_share=shown.share,
-        push_delay=shown.delay, t=model.t, tau_ext=tau_ext,
+        space, model, filter=label, default=int(label == DEFAULT), push_peak=push, push_share=share,
+        push_delay=late, t=model.t, tau_ext=tau_ext,
     )  # fmt: skip
 
 
