@@ -46,11 +46,8 @@ def read(path: Path, options: Options) -> Log:
     pieces, layout, lost = _pieces(path, dtype, count)
     channels = tuple(Channel(name, unit_in(name)) for name in unique(names))
     facts = {"type": f"{dtype.name}, {'little' if dtype.str[0] == '<' else 'big'}-endian", "layout": layout}
-    log = BinaryLog(path, "binary", channels, facts=facts, dtype=dtype, pieces=pieces)
-    if lost:
-        log.cut = True
-        log.warnings.append(f"the file ends within a row: its last {lost} bytes are not read")
-    return log
+    warnings = [f"the file ends within a row: its last {lost} bytes are not read"] if lost else []
+    return BinaryLog(path, "binary", channels, facts=facts, warnings=warnings, cut=lost > 0, dtype=dtype, pieces=pieces)
 
 
 @dataclass

@@ -132,19 +132,17 @@ def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
     """A trajectory with its objective, its condition number and its excess over the limits."""
     F = fourier.observation(joint.terms, series)
     t = np.linspace(0.0, series.period, 401)
-    q, dq, ddq = fourier.motion(series, t)
+    motion = dict(zip(("q", "dq", "ddq"), fourier.motion(series, t), strict=True))
     ranges = zip(("excess_q", "excess_dq", "excess_ddq"), fourier.ranges(series), joint.limits.motion, strict=True)
     excesses = {name: float(max(low - least, most - high, 0.0)) for name, (least, most), (low, high) in ranges}
-    return Excitation(
+    return Excitation.like(
+        series,
         joint=joint.name,
         source=source,
-        period=series.period,
         objective=float(fourier.determinant(F)),
         condition=float(10 ** fourier.condition(F)),
         coefficients=tuple(series.x.tolist()),
         **excesses,
         t=t,
-        q=q,
-        dq=dq,
-        ddq=ddq,
+        **motion,
     )

@@ -66,8 +66,7 @@ def open_in_child(path: Path) -> Log:
     log.started = (UNIX_EPOCH + timedelta(microseconds=microseconds)).replace(tzinfo=None).isoformat()
     alone = len(log.topics) == 1
     log.channels = tuple(channel for topic in log.topics for channel in topic.channels(alone))
-    if alone:
-        log.time = log.topics[0].clock
+    log.time = log.topics[0].clock if alone else ""
     return log
 
 

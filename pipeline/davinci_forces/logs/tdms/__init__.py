@@ -45,10 +45,9 @@ def read(path: Path, options: Options) -> Log:
     channels = _channels(walk.objects, warnings)
     name = {p: channel.name for p, channel in zip(paths, channels, strict=True)}
     log = TdmsLog(
-        path, "tdms", channels, warnings=warnings, size=walk.end, index=index, names=name,
+        path, "tdms", channels, warnings=warnings, cut=walk.cut, size=walk.end, index=index, names=name,
         origin=min((second for second in origins if second is not None), default=0),
     )  # fmt: skip
-    log.cut = walk.cut
     _describe(log, walk, waveforms)
     return log
 

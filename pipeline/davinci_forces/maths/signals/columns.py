@@ -52,9 +52,8 @@ def blocks(columns: Sequence[Array], t: Array | None = None) -> Blocks | None:
     for n in range(len(columns) // 3, 0, -1):
         moves = moving_positions(columns[:n])
         pairs = [derivative(columns[i], columns[n + i], t) for i in moves]
-        if pairs and min(correlation for correlation, _ in pairs) >= MIN_COSINE:
-            best = max(pairs)
-            return Blocks(n, best[1], moves, min(correlation for correlation, _ in pairs))
+        if pairs and min(pairs)[0] >= MIN_COSINE:
+            return Blocks(n, max(pairs)[1], moves, min(pairs)[0])
     return None
 
 

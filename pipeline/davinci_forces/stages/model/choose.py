@@ -32,6 +32,7 @@ from davinci_forces.records.record import Diagnostic, by_name, diagnostic, join_
 from davinci_forces.records.recordings import Average, Motion
 from davinci_forces.robots.robot import Robot
 
+STEP_COLUMNS = ("step_cutoff", "step_lag", "step_ridge", "parameters", "score")
 MAPPED_ROLES = ("identification", "friction")
 MAPPED_ESTIMATORS = ("lse", "ridge")  # without constraints
 MAX_MSE_RATIO = 2.0  # of parameters that a mechanism can have to those without a positive inertia, which they replace
@@ -194,11 +195,9 @@ def search_record(search: SearchResult, candidate: Candidate) -> ModelSearch:
         used=int(used),
         chosen_step=steps.index(chosen),
         step=np.array([step.name for step in steps], object),
-        step_cutoff=np.array([step.processing.cutoff for step in steps]),
-        step_lag=np.array([step.processing.effort_lag for step in steps]),
-        step_ridge=np.array([step.strength for step in steps]),
-        parameters=np.array([step.size for step in steps]),
-        score=np.array([step.score for step in steps]),
+        **dict(
+            zip(STEP_COLUMNS, np.array([(*s.processing, s.strength, s.size, s.score) for s in steps]).T, strict=True)
+        ),
         score_std=np.array([standard_error(step.errors, search.best.errors) for step in steps]),
     )
 
