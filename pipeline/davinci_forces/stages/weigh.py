@@ -84,10 +84,9 @@ def run(
             reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
             each = paths.periods_of((model.t, loads[0]), efforts[model.joint], first, length, count)
             spread = weighing.spread_between(each) if np.abs(loads[0]).max() > MIN_LOAD else 0.0
-            yield Load(
-                log=model.log, joint=model.joint, weight=weight_log.log, role=model.role, rate=count / length,
-                period=period, is_current=int(bool(joint.effort) or joint.name in measured),
-                periods=len(each), period_spread=spread,
+            yield Load.like(
+                model, weight=weight_log.log, rate=count / length, period=period, periods=len(each),
+                period_spread=spread, is_current=int(bool(joint.effort) or joint.name in measured),
                 t=((np.arange(count) + 0.5) / count * length)[reached],
                 **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
@@ -172,11 +171,9 @@ def proposal(record: TorqueConstant, joint: Joint) -> str:
     """State the torque constant that a known mass gives, beside that of the study, and how to apply it."""
     value, std, used = record.torque_constant, record.torque_constant_std, record.torque_constant_used
     decimals = max(1 - int(np.floor(np.log10(std))), 0)
-    text = (
-        f"{record.log}/{record.joint}: the known mass of {record.stated_mass:g} kg gives torque_constant = "
-        f"{value:.{decimals}f} ± {std:.{decimals}f} {joint.unit('{torque_constant}')} with "
-        f"gear_ratio = {joint.gear_ratio:g}"
-    )
+    constant = f"torque_constant = {value:.{decimals}f} ± {std:.{decimals}f} {joint.unit('{torque_constant}')}"
+    gives = f"the known mass of {record.stated_mass:g} kg gives {constant} with gear_ratio = {joint.gear_ratio:g}"
+    text = f"{record.log}/{record.joint}: {gives}"
     if np.isnan(used):
         return f'{text}; it is not applied: to use it, state it for this joint in place of effort = "A"'
     away = abs(value - used) / std
@@ -226,9 +223,8 @@ def estimate_mass(
     tare_mass = free.masses.get(weight_log.tare if tare else "", MassEstimate(float("nan"), float("nan")))
     differing = joints[test.differing] if test.ratio > 1.0 else ""
     if differing:
-        yield diagnostic(
-            "weigh", f"{weight_log.log}.joints", "warning", contradiction(weight_log.log, joints, alone[0], test)
-        )
+        text = contradiction(weight_log.log, joints, alone[0], test)
+        yield diagnostic("weigh", f"{weight_log.log}.joints", "warning", text)
     yield Weight(
         log=weight_log.log, moves_with=weight_log.weight.moves_with, tare=weight_log.tare if tare else "",
         stated_mass=stated, mass=mass, mass_std=std, run_std=run_std, fit_std=fit_std, widening=free.widening,

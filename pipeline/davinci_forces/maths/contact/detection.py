@@ -56,7 +56,7 @@ class FreeMotionStatistics(NamedTuple):
     """An external effort where nothing touches the robot."""
 
     rms: float
-    largest: float
+    free_max: float
     crossings: float  # [1/s] upward crossings of zero
 
 

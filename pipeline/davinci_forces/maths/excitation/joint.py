@@ -50,10 +50,8 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
         return f"there is no position between {low:g} and {high:g}"
     for name, (lower, upper) in zip(("velocity", "acceleration"), rates, strict=True):
         if not lower < 0 < upper:
-            return (
-                f"the {name} of a periodic motion is positive and negative by turns (its mean is zero), "
-                f"so the limits {lower:g} to {upper:g} must have zero between them"
-            )
+            why = f"the {name} of a periodic motion is positive and negative by turns (its mean is zero)"
+            return f"{why}, so the limits {lower:g} to {upper:g} must have zero between them"
     return ""
 
 

@@ -90,10 +90,9 @@ class ClockStatistics:
 def remarks(clock: ClockStatistics, rate: float) -> Iterator[str]:
     """State that many rows repeat, and that the time between samples varies or is long, for a clock of `rate` [Hz]."""
     if clock.duplicates > MAX_REPEATED * clock.samples:
-        yield (
-            f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
-            "before in every channel used: the recorder ran faster than the robot's measurements"
-        )
+        share = f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%})"
+        why = "the recorder ran faster than the robot's measurements"
+        yield f"{share} repeat the one before in every channel used: {why}"
     if clock.jitter * rate > MAX_JITTER:
         yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / rate:.3g} ms"
     if clock.longest_gap * rate > GAP:

@@ -101,9 +101,9 @@ class Indentation(NamedTuple):
     state: str  # FOUND, ALL_CONTACT, NONE or TOO_EARLY
     inside: Booleans  # (N,) samples of contact
     loading: Booleans  # (N,) up to the deepest sample
-    onset: float  # depth of first contact [m]; NaN where it is not known
-    onset_std: float
-    release: float  # depth of last contact [m]
+    onset_depth: float  # of first contact [m]; NaN where it is not known
+    onset_depth_std: float
+    release_depth: float  # of last contact [m]
 
 
 def all_of(depth: Array, counted: Booleans, state: str = ALL_CONTACT) -> Indentation:

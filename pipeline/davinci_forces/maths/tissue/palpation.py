@@ -165,13 +165,13 @@ class PalpatedPush(NamedTuple):
     k_loading_std: float
     k_unloading: float
     k_unloading_std: float
-    k_std_model: float  # [N/m] by the error of a joint's model in the force
+    k_t_std_model: float  # [N/m] by the error of a joint's model in the force
     explained: float  # share of the force in contact, beyond its noise, that the line explains; NaN without contact
 
     @property
     def depth_in_contact(self) -> Array:
         """Depth below first contact (n,) [m], or below the least depth in contact if first contact is not known."""
-        onset = self.contact.onset
+        onset = self.contact.onset_depth
         return self.depth - (onset if np.isfinite(onset) else self.depth[self.contact.inside].min())
 
     @property
@@ -226,7 +226,7 @@ def _pushed(
     common = float(np.sqrt(np.mean(probing.std[part][inside] ** 2))) if line else 0.0
     error = indentation.slope_error(depth[inside], common) if line else 0.0
     if line and line.k:  # an error of the force, over the stiffness, moves the onset
-        contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
+        contact = contact._replace(onset_depth_std=float(np.hypot(contact.onset_depth_std, common / abs(line.k))))
     ways = (inside & loading, inside & ~loading)
     loaded, unloaded = (indentation.slope_with_std(depth[way], force[way], common) for way in ways)
     place, t = probing.place[part], probing.t[part]
@@ -257,48 +257,39 @@ def remarks(pushes: Sequence[PalpatedPush]) -> Iterator[str]:
     falling = [(push, line.k) for push, line in touched if line.k < 0 and push.explained > MIN_EXPLAINED]
     if falling:
         which, worst = _which([push for push, _ in falling], pushes), min(k for _, k in falling)
-        yield (
-            f"{which}: the force falls as the depth grows, by up to {-worst:.4g} N/m, which no tissue does; "
-            "write sign = -1 for the channel of the depth or of the force"
-        )
+        remedy = "write sign = -1 for the channel of the depth or of the force"
+        yield f"{which}: the force falls as the depth grows, by up to {-worst:.4g} N/m, which no tissue does; {remedy}"
     if not (best := max(push.explained for push, _ in touched)) > MIN_EXPLAINED:
-        yield (
-            f"no push counts: a straight line explains at most {best:.0%} of its force beyond noise, and "
-            f"{MIN_EXPLAINED:.0%} are needed; push slower or deeper, or check what else the force contains"
-        )
+        share = f"at most {best:.0%} of its force beyond noise, and {MIN_EXPLAINED:.0%} are needed"
+        remedy = "push slower or deeper, or check what else the force contains"
+        yield f"no push counts: a straight line explains {share}; {remedy}"
 
 
 def _contact(pushes: Sequence[PalpatedPush], touched: Sequence[tuple[PalpatedPush, StraightLine]]) -> Iterator[str]:
     free = [push for push in pushes if push.contact.state == NONE]
     if not touched:
         largest = max(float(np.ptp(push.force)) for push in pushes)
-        yield (
-            f"no contact is found in {_count(len(pushes))}: the force changes by {largest:.3g} N at most and does not "
-            'follow the depth; check both channels, or state contact = [[start, end]] or contact = "all"'
-        )
-    elif free and not any(push.contact.onset == push.contact.onset for push, _ in touched):
+        why = f"the force changes by {largest:.3g} N at most and does not follow the depth"
+        remedy = 'check both channels, or state contact = [[start, end]] or contact = "all"'
+        yield f"no contact is found in {_count(len(pushes))}: {why}; {remedy}"
+    elif free and np.isnan([push.contact.onset_depth for push, _ in touched]).all():
         yield f"{_which(free, pushes)} of {_count(len(pushes))} without contact"
     early = [push for push, _ in touched if push.contact.state == TOO_EARLY]
     if early:
-        yield (
-            f"{_which(early, pushes)}: contact from the first sample, so where it begins is not known and every sample "
-            'counts as contact; begin before contact, or state contact = "all"'
-        )
+        what = "contact from the first sample, so where it begins is not known and every sample counts as contact"
+        yield f'{_which(early, pushes)}: {what}; begin before contact, or state contact = "all"'
 
 
 def _units(touched: Sequence[tuple[PalpatedPush, StraightLine]]) -> Iterator[str]:
     deep = float(np.median([np.ptp(push.depth[push.contact.inside]) for push, _ in touched]))
     k = float(np.median([abs(line.k) for _, line in touched]))
+    doubt = "no tissue does so, so the depth is probably"
     if deep > MAX_DEPTH or k < MIN_STIFFNESS:
-        yield (
-            f"pushes are {deep:.3g} m deep and meet {k:.3g} N/m: no tissue does so, so the depth is probably in mm, "
-            'not in m; write unit = "mm" for its channel, or check the unit of the force'
-        )
+        remedy = 'write unit = "mm" for its channel, or check the unit of the force'
+        yield f"pushes are {deep:.3g} m deep and meet {k:.3g} N/m: {doubt} in mm, not in m; {remedy}"
     elif k > MAX_STIFFNESS:
-        yield (
-            f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, so the depth is probably in "
-            "m, not in mm; correct the unit of its channel, or check that of the force"
-        )
+        remedy = "correct the unit of its channel, or check that of the force"
+        yield f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: {doubt} in m, not in mm; {remedy}"
 
 
 def _which(some: Sequence[PalpatedPush], pushes: Sequence[PalpatedPush]) -> str:

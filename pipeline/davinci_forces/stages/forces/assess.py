@@ -63,10 +63,9 @@ def touch_warning(track: Track, free: Booleans, entry: LogEntry, robot: Robot) -
             remedy = "leave this time out of its free windows"
         else:
             remedy = "add this time to its contact windows, or state in its free windows when nothing touched the arm"
-        message = (
-            f"{track.log}/{track.joint}: at {track.t[size.argmax()]:.2f} s something seems to touch the arm: the "
-            f"external effort is {effort}, {size.max() / level:.0f} times as large as elsewhere in the log; {remedy}"
-        )
+        what = f"{track.log}/{track.joint}: at {track.t[size.argmax()]:.2f} s something seems to touch the arm"
+        why = f"the external effort is {effort}, {size.max() / level:.0f} times as large as elsewhere in the log"
+        message = f"{what}: {why}; {remedy}"
         yield diagnostic("assess", f"{track.log}.{track.joint}", "warning", message)
 
 
@@ -85,9 +84,9 @@ def space_of(
     if track.role == "identification":
         highest = MAX_FITTED * typical_alarm_level(tau_ext, free, track.rate)
         if len(windows.unbroken(track.t[free & (np.abs(tau_ext) > highest)], windows.TRANSIENT)) > MAX_TOUCHES:
-            highest = statistics.largest
+            highest = statistics.free_max
         largest_stated = float(np.abs(tau_ext[free & stated]).max(initial=0.0))
-        statistics = statistics._replace(largest=max(min(statistics.largest, highest), largest_stated))
+        statistics = statistics._replace(free_max=max(min(statistics.free_max, highest), largest_stated))
     coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace.like(
         space,
@@ -96,7 +95,6 @@ def space_of(
         filter=name,
         tested=int(np.sum(free)),
         band_width=NORMAL_95 * float(std[free].mean()),
-        free_max=statistics.largest,
         quartile_coverage=coverage,
         quartile_coverage_std=coverage_std,
     )

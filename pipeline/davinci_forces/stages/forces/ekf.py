@@ -108,19 +108,16 @@ def numbers_of(estimate: Tracked, offset: DayOffset, converged: Booleans, free: 
 
 def divergence_warning(model: JointModel, nis: float) -> Diagnostic:
     """Warn of innovations that are much larger than the filter assumes."""
-    message = (
-        f"{model.log}/{model.joint}: the filter's innovations are {np.sqrt(nis / 2.0):.3g} times as large as it "
-        "assumes, so the measured motion does not follow from the effort; check the units, signs and clock of its "
-        "channels, and whether a sensor was stuck"
-    )
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)
+    size = f"the filter's innovations are {np.sqrt(nis / 2.0):.3g} times as large as it assumes"
+    message = f"{model.log}/{model.joint}: {size}, so the measured motion does not follow from the effort"
+    remedy = "check the units, signs and clock of its channels, and whether a sensor was stuck"
+    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", f"{message}; {remedy}")
 
 
 def drift_warning(model: JointModel, offset: DayOffset, unit: str) -> Diagnostic:
     """Warn of an offset that changes between the free windows."""
-    message = (
-        f"{model.log}/{model.joint}: the offset drifts within the free windows by {offset.drift:.3g} {unit}, with a "
-        f"standard error of {offset.drift_std:.2g} {unit}, so efforts between them are uncertain by as much; shorten "
-        "the log, or state free windows nearer to where efforts matter, before and after"
-    )
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)
+    drift = f"{offset.drift:.3g} {unit}, with a standard error of {offset.drift_std:.2g} {unit}"
+    message = f"{model.log}/{model.joint}: the offset drifts within the free windows by {drift}"
+    remedy = "shorten the log, or state free windows nearer to where efforts matter, before and after"
+    text = f"{message}, so efforts between them are uncertain by as much; {remedy}"
+    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", text)

@@ -121,19 +121,15 @@ def contacts(
             # A short peak is flattened below the means; its error stays.
             peak = max(summary.peak, summary.mean, middle[0], key=lambda x: x * np.sign(summary.peak))
             above = clear and bool(is_above[~is_outside(track.t, [window])].any())
-            measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *middle, *impulse)
-            rows.append((stated, event is not None, above, *measured))
+            height = (summary.t_peak, peak, summary.peak_std, *middle, summary.mean, summary.mean_std)
+            rows.append((stated, event is not None, *times, *duration, *height, *impulse, above))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
         yield diagnostic("measure", f"{track.log}.{track.joint}.short", "warning", *short)
     if not rows:
         return
-    names = (
-        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std",
-        "t_peak", "peak", "peak_std", "mean", "mean_std", "middle_mean", "middle_mean_std", "impulse", "impulse_std",
-    )  # fmt: skip
-    yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
+    yield Contact.like(threshold, log=track.log, **dict(zip(Contact.columns(), np.array(rows).T, strict=True)))
 
 
 def steady_effort(track: Track) -> tuple[Array, Array]:
@@ -200,11 +196,10 @@ def friction_note(track: Track, windows: Sequence[Window], robot: Robot) -> Diag
     unit = robot.joint(track.joint).unit("{effort}")
     first = f"at {windows[0][0]:.4g} s" + (f", the first of {len(windows)}," if windows[1:] else "")
     largest = max(largest_effort(track, window) for window in windows)
-    text = (
-        f"{track.log}/{track.joint}: an effort {first} of up to {largest:.2g} {unit} does not count as a contact: the "
-        f"joint reverses so slowly that static friction may be the cause (up to {track.static_friction:.2g} {unit}); "
-        "state a window of contact in study.toml if something touched the arm"
-    )
+    what = f"{track.log}/{track.joint}: an effort {first} of up to {largest:.2g} {unit} does not count as a contact"
+    why = "the joint reverses so slowly that static friction may be the cause"
+    remedy = "state a window of contact in study.toml if something touched the arm"
+    text = f"{what}: {why} (up to {track.static_friction:.2g} {unit}); {remedy}"
     return diagnostic("measure", f"{track.log}.{track.joint}.friction", "note", text)
 
 

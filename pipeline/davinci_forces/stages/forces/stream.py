@@ -101,7 +101,7 @@ def compare(
     ratio_std = MEDIAN_STD * float(np.std(ratios, ddof=1)) / len(ratios) ** 0.5 if len(ratios) > 1 else float("nan")
     yield Streamed.like(
         statistics, track, stream_delay=late, free_rms=rms, free_rms_std=rms_std, stream_loss=loss,
-        stream_loss_std=loss_std, free_max=statistics.largest, peak_ratio=ratio, peak_ratio_std=ratio_std, onset=onset,
+        stream_loss_std=loss_std, peak_ratio=ratio, peak_ratio_std=ratio_std, onset=onset,
         duration=duration, smooth_peak=smooth, peak=peak,
     )  # fmt: skip
 

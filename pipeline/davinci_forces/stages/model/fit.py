@@ -310,10 +310,8 @@ def cross_fits(
     for out, theta in enumerate(refits(regression, estimator(name))):
         names = ", ".join(log for log, number in zip(logs, fold, strict=True) if number == out)
         if isinstance(theta, NotIdentifiable):
-            why = f"because a refit is not possible: {theta}"
-            yield diagnostic(
-                "fit", model.group, "note", f"{model.group}: {name} has no leave-out score of {names}, {why}"
-            )
+            text = f"{name} has no leave-out score of {names}, because a refit is not possible: {theta}"
+            yield diagnostic("fit", model.group, "note", f"{model.group}: {text}")
         else:
             left_out.append(names)
             thetas.append(theta)

@@ -100,10 +100,9 @@ def sign_warning(motion: Motion, tau_hat: Array, free: Booleans) -> Iterator[Dia
     """Warn of an effort that the model (N,) explains far better with the other sign, at free samples (N,)."""
     wrong, right = (float(np.std((motion.tau - sign * tau_hat)[free])) for sign in (1.0, -1.0))
     if right < OPPOSED * wrong:
-        text = (
-            f"{motion.log}/{motion.joint}: the effort is the opposite of the model's, whose error falls from "
-            f"{wrong:.2g} to {right:.2g} by the other sign; correct the `sign` of its effort or position in study.toml"
-        )
+        falls = f"whose error falls from {wrong:.2g} to {right:.2g} by the other sign"
+        what = f"{motion.log}/{motion.joint}: the effort is the opposite of the model's, {falls}"
+        text = f"{what}; correct the `sign` of its effort or position in study.toml"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.sign", "warning", text)
 
 
@@ -211,7 +210,6 @@ def inertia_warning(motion: Motion, fit: Fit, identified: Identified) -> str:
     if are_negative(fit.theta[friction], fit.theta_std[friction]):
         fitted = ", ".join(fit.logs)
         return f"{text}; its friction is negative, too: correct the `sign` of its effort or position in {fitted}"
-    return (
-        f"{text}; the report may name the cause beside all fits of {motion.joint}: a motion that hardly excites it, a "
-        "wrong sign, other joints that move in the same logs, or terms that the model lacks"
-    )
+    causes = "a wrong sign, other joints that move in the same logs, or terms that the model lacks"
+    where = f"the report may name the cause beside all fits of {motion.joint}"
+    return f"{text}; {where}: a motion that hardly excites it, {causes}"

@@ -38,16 +38,12 @@ def run(
         return
     moving = [signal for signal in signals if not signal.at_rest]
     at_rest = [signal.joint for signal in signals if signal.at_rest]
-    if at_rest:
-        yield diagnostic(
-            "average", entry.name, "note", *(f"{entry.name}: {j} does not move: at rest, and left out" for j in at_rest)
-        )
+    if texts := [f"{entry.name}: {joint} does not move: at rest, and left out" for joint in at_rest]:
+        yield diagnostic("average", entry.name, "note", *texts)
     if not moving:
-        raise NotPeriodic(
-            f"{entry.name}: no joint moves of those that study.toml names, {', '.join(at_rest)}, so there is nothing "
-            "to identify; name the channels of the joint that moves, or check their units, and the clock, of "
-            f"{signals[0].rate:.4g} Hz"
-        )
+        why = f"no joint moves of those that study.toml names, {', '.join(at_rest)}, so there is nothing to identify"
+        remedy = "name the channels of the joint that moves, or check their units, and the clock"
+        raise NotPeriodic(f"{entry.name}: {why}; {remedy}, of {signals[0].rate:.4g} Hz")
     least = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)
     if repeat is None:
@@ -88,11 +84,9 @@ def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal]
         periodic = [signal for signal in moving if common_repetition([signal]) is not None]
         repeat = common_repetition(periodic) if periodic else None
     if repeat is None and entry.period:
-        raise NotPeriodic(
-            f"{no_repetition_message(moving[0], entry)}, but the study states a period of {entry.period} s; record "
-            "more periods, leave out what comes before and after them (skip and until in study.toml), or give the log "
-            "another role"
-        )
+        why = f"{no_repetition_message(moving[0], entry)}, but the study states a period of {entry.period} s"
+        remedy = "record more periods, leave out what comes before and after them (skip and until in study.toml)"
+        raise NotPeriodic(f"{why}; {remedy}, or give the log another role")
     if repeat is None:
         return moving, None, []
     aperiodic = [signal.joint for signal in moving if signal not in periodic]
@@ -138,10 +132,8 @@ def longest_stretch(
     if factor > 1:
         length = refine(t, positions, factor * length, max_harmonics)
     if whole_periods(t, length, rate) < 2:
-        raise NotPeriodic(
-            f"{entry.name}: the motion repeats only from {t[0]:.2f} to {t[-1]:.2f} s, fewer than two periods of "
-            f"{length:.4f} s; record more periods"
-        )
+        where = f"from {t[0]:.2f} to {t[-1]:.2f} s, fewer than two periods of {length:.4f} s"
+        raise NotPeriodic(f"{entry.name}: the motion repeats only {where}; record more periods")
     return span, length
 
 
@@ -204,11 +196,9 @@ def reconcile_period(estimate: Period, entry: LogEntry) -> tuple[Period, list[st
         return Period(stated, estimate.std), []
     if difference <= MIN_MISMATCH * stated:
         return estimate, []
-    return estimate, [
-        f"{entry.name}: the study states a period of {stated} s, but the joints repeat every "
-        f"{estimate.length:.4f} s (+- {estimate.std:.1g} s), which is used; correct the period in study.toml, or "
-        "leave it out"
-    ]
+    found = f"{estimate.length:.4f} s (+- {estimate.std:.1g} s), which is used"
+    what = f"{entry.name}: the study states a period of {stated} s, but the joints repeat every {found}"
+    return estimate, [f"{what}; correct the period in study.toml, or leave it out"]
 
 
 def average_joint(

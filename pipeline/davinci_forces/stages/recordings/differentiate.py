@@ -21,12 +21,9 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
     largest, share = fourier.largest_omitted(amplitude, orders)
     if share > fourier.MIN_SHARE:
-        yield diagnostic(
-            "differentiate", f"{average.log}.{average.joint}", "warning",
-            f"{average.log}/{average.joint}: harmonic {largest} of the position is "
-            f"{share:.1%} of the largest, but only {orders} harmonics are kept; raise "
-            "`harmonics` in [settings] if it was commanded",
-        )  # fmt: skip
+        what = f"harmonic {largest} of the position is {share:.1%} of the largest, but only {orders} harmonics are kept"
+        text = f"{average.log}/{average.joint}: {what}; raise `harmonics` in [settings] if it was commanded"
+        yield diagnostic("differentiate", f"{average.log}.{average.joint}", "warning", text)
 
 
 def derivatives(average: Average, harmonics: int) -> Iterator[Column]:

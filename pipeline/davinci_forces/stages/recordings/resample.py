@@ -167,11 +167,9 @@ def limit_faults(recording: Recording, joint: Joint, smooth: tuple[Column, Colum
             largest = max(largest, 0.0 if assumed else reach / limit)
     if beyond:
         units = "degrees" if joint.kind is Kind.REVOLUTE else "mm"
-        fault = (
-            f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts? write the "
-            f'unit of the channel in study.toml, as unit = "{units[:3]}", or the gear_ratio of a motor, or correct the '
-            "limits of the robot; if you pass arrays, convert them"
-        )
+        doubt = f"{recording.log}/{recording.joint}: {', and '.join(beyond)}; are they in {units} or counts?"
+        remedy = f'write the unit of the channel in study.toml, as unit = "{units[:3]}", or the gear_ratio of a motor'
+        fault = f"{doubt} {remedy}, or correct the limits of the robot; if you pass arrays, convert them"
         if largest > IMPOSSIBLE:
             raise BadLog(fault)
         yield fault
@@ -213,26 +211,22 @@ def beyond_limits(recording: Recording, joint: Joint, smooth: tuple[Column, Colu
 def faults(recording: Recording) -> Iterator[str]:
     """State where a position was stuck or jumps, or a drive was at its limit."""
     name, q = f"{recording.log}/{recording.joint}", recording.q
+    remedy = "leave that out by `skip` and `until`, or record it again"
     for start, end, jump in find_stuck(recording.t, q):
-        yield (
-            f"{name}: the position stands still from {start:.3f} to {end:.3f} s and then jumps by "
-            f"{jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
-        )
+        stop = f"stands still from {start:.3f} to {end:.3f} s and then jumps by {jump:.3g}"
+        yield f"{name}: the position {stop}, as if its sensor was stuck; {remedy}"
     step = np.diff(q)
     jumps = np.flatnonzero(np.abs(step) > max(MIN_JUMP * np.ptp(q), MAX_USUAL * np.quantile(np.abs(step), 0.99)))
     if len(jumps):
-        yield (
-            f"{name}: the position jumps by {step[jumps[0]]:.3g} within one sample at {recording.t[jumps[0]]:.3f} s"
-            f"{f' and {len(jumps) - 1} times more' if len(jumps) > 1 else ''}, as of an angle that wraps or a sensor "
-            "that fails; leave that out by `skip` and `until`, or record it again"
-        )
+        more = f" and {len(jumps) - 1} times more" if len(jumps) > 1 else ""
+        leap = f"jumps by {step[jumps[0]]:.3g} within one sample at {recording.t[jumps[0]]:.3f} s{more}"
+        yield f"{name}: the position {leap}, as of an angle that wraps or a sensor that fails; {remedy}"
     if not np.ptp(recording.tau):
         yield f"{name}: the effort is {recording.tau[0]:.3g} throughout; check the column of its channel"
     elif samples := count_saturated(recording.tau):
-        yield (
-            f"{name}: the effort is exactly at its largest or smallest value in {samples} samples: the drive or its "
-            "sensor was saturated, so the true effort may be larger than the log says; record with less effort"
-        )
+        what = f"the effort is exactly at its largest or smallest value in {samples} samples"
+        why = "the drive or its sensor was saturated, so the true effort may be larger than the log says"
+        yield f"{name}: {what}: {why}; record with less effort"
 
 
 def step_of(t: Column) -> float:
@@ -270,10 +264,9 @@ def remarks(signal: Signal, recording: Recording, T_s: float, cuts: list[int], s
         notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")
     slow: Booleans = (np.diff(t) > longest_bridge(T_s)) & ~are_gaps(t, T_s)
     for part in runs(slow)[:MAX_LISTED_STRETCHES]:
-        notes.append(
-            f"{name}: from {t[part.start]:.3f} to {t[part.stop]:.3f} s the log is sampled at "
-            f"{1 / step_of(t[part.start : part.stop + 1]):.4g} Hz, not at {1 / T_s:.4g} Hz; its times are kept"
-        )
+        span, rate = f"{t[part.start]:.3f} to {t[part.stop]:.3f} s", 1 / step_of(t[part.start : part.stop + 1])
+        rates = f"at {rate:.4g} Hz, not at {1 / T_s:.4g} Hz"
+        notes.append(f"{name}: from {span} the log is sampled {rates}; its times are kept")
     if signal.method != "as recorded":
         notes.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {signal.method}")
     if count := int(signal.filled.sum()):

@@ -41,18 +41,15 @@ def run(
         return
     pairs = list(comparisons(touch.t, sensor, list(forces), list(tracks), robot))
     if not pairs:
-        message = (
-            f"{entry.name}: its force sensor is not compared with an estimate: neither the force at the tip nor the "
-            "external effort of a prismatic joint is known for enough samples"
-        )
+        why = "neither the force at the tip nor the external effort of a prismatic joint is known for enough samples"
+        message = f"{entry.name}: its force sensor is not compared with an estimate: {why}"
         yield diagnostic("sense", entry.name, "warning", message)
     shown = [force for axis, f, measured in pairs for force in sensor_force(entry, axis, f, touch.t, measured)]
     yield from shown
     if opposite := ", ".join(f"force_{force.axis}" for force in shown if force.axis in AXES and is_opposite(force)):
         text = f"{entry.name}: the sensor shows the opposite of the estimate: if it measures the force on the robot"
-        yield diagnostic(
-            "sense", f"{entry.name}.sign", "warning", f"{text}, write sign = -1 with {opposite} in study.toml"
-        )
+        remedy = f"write sign = -1 with {opposite} in study.toml"
+        yield diagnostic("sense", f"{entry.name}.sign", "warning", f"{text}, {remedy}")
 
 
 def is_opposite(force: SensorForce) -> bool:

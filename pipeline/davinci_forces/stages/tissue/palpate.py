@@ -15,6 +15,7 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
 
 QUARTILE_FACTOR = 1.857  # of the variance of a mean: p (1 - p) over the square of the normal density, p = 1/4
+WAYS = ("loading", "loading_std", "unloading", "unloading_std")
 MIN_SAMPLES_PUSH = 8  # in a log, and in a push with which tissue models are compared
 
 
@@ -41,10 +42,9 @@ def run(
     touched = [push for push in pushes if push.line is not None]
     texts = [f"{entry.name}: {remark}" for remark in palpation.remarks(pushes)]
     if not entry.contact and data.push.any() and palpation.touches_at_once(numbered_pushes(data)):
-        texts.append(
-            f"{entry.name}: the force rises from the first sample of each push on, but its contact is searched, which "
-            'changes the stiffness; write contact = "all" if the probe touches from the start, else contact windows'
-        )
+        what = "the force rises from the first sample of each push on, but its contact is searched"
+        remedy = 'write contact = "all" if the probe touches from the start, else contact windows'
+        texts.append(f"{entry.name}: {what}, which changes the stiffness; {remedy}")
     if texts:
         yield diagnostic("palpate", entry.name, "warning", *texts)
     if not touched:
@@ -146,12 +146,8 @@ def record_of(push: palpation.PalpatedPush, log: str, best: tissue.FittedLaw | N
         push=push.number,
         contact=push.contact.state,
         k_t=line.k,
-        k_t_std=float(np.hypot(line.k_std, push.k_std_model)),
-        k_t_std_model=push.k_std_model,
+        k_t_std=float(np.hypot(line.k_std, push.k_t_std_model)),
         intercept=line.c,
-        onset_depth=push.contact.onset,
-        onset_depth_std=push.contact.onset_std,
-        release_depth=push.contact.release,
         fitted=np.where(inside, fitted, np.nan),
         **dict(zip("xyz", push.place.T, strict=True)),
     )
@@ -161,7 +157,7 @@ def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str
     """The stiffness of a log: the median slope of the pushes whose force is a straight line."""
     lines = [push.line for push in pushes if push.line is not None]
     k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
-    model = np.array([push.k_std_model for push in pushes])
+    model = np.array([push.k_t_std_model for push in pushes])
     counts = np.array([push.explained for push in pushes]) > palpation.MIN_EXPLAINED
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
@@ -188,14 +184,11 @@ def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str
         k_t_std=np.hypot(k_std, model),
         r2=r2,
         r2_std=2.0 * r2 * (1.0 - r2) * np.hypot(k_std, model) / np.where(k == 0.0, 1.0, np.abs(k)),  # d R2 of dk
-        onset_depth=np.array([push.contact.onset for push in pushes]),
-        onset_depth_std=np.array([push.contact.onset_std for push in pushes]),
+        onset_depth=np.array([push.contact.onset_depth for push in pushes]),
+        onset_depth_std=np.array([push.contact.onset_depth_std for push in pushes]),
         onset=np.array([push.t[int(np.argmax(push.contact.inside))] for push in pushes]),
         onset_std=np.array([onset_time_std(push) for push in pushes]),
-        k_t_loading=np.array([push.k_loading for push in pushes]),
-        k_t_loading_std=np.array([push.k_loading_std for push in pushes]),
-        k_t_unloading=np.array([push.k_unloading for push in pushes]),
-        k_t_unloading_std=np.array([push.k_unloading_std for push in pushes]),
+        **{f"k_t_{way}": np.array([getattr(push, f"k_{way}") for push in pushes]) for way in WAYS},
         lost=lost[:, 0],
         lost_std=lost_std[:, 0],
         lost_share=lost[:, 1],
@@ -207,7 +200,7 @@ def stiffness_of(pushes: Sequence[palpation.PalpatedPush], log: str, source: str
 def onset_time_std(push: palpation.PalpatedPush) -> float:
     """Standard error of the time of first contact [s]: that of its depth over the rate of the depth there."""
     rate = abs(float(push.rate[int(np.argmax(push.contact.inside))]))
-    return push.contact.onset_std / rate if rate > 0.0 else float("nan")
+    return push.contact.onset_depth_std / rate if rate > 0.0 else float("nan")
 
 
 def model_of(
