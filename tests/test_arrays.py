@@ -4,6 +4,8 @@ import doctest
 import gc
 import pickle
 import re
+import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -186,6 +188,56 @@ def test_settings_are_saved_and_a_robot_of_no_file_is_not(identified, folder, tm
         pickle.dumps(identified)
 
 
+def test_a_loaded_study_predicts_and_estimates_as_its_records_do_without_a_new_fit(folder):
+    made = davinci_forces.load(folder)
+    assert made.joints == (JOINT,)
+    [fit] = made.record
+    assert_equal_numbers(fit, next(of for of in of_study(folder, Fit) if of.key == fit.key))
+    processed = runs.folders(folder, None, None).processed
+    before = {file: file.read_bytes() for file in processed.rglob("*") if file.is_file()}
+    effort = made.external_effort(PUSHED.t, PUSHED.q, PUSHED.tau, dq=PUSHED.dq)
+    [same] = [track for track in of_study(folder, Track) if track.log == "pushed"]
+    assert_allclose(effort.tau_ext[JOINT], same.tau_ext_smooth, rtol=1e-12, atol=1e-12)
+    [model] = [model for model in of_study(folder, JointModel) if model.log == "pushed"]
+    predicted = made.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)[JOINT]
+    assert_allclose(predicted["tau"], model.tau_hat, rtol=1e-12, atol=1e-12)
+    assert {file: file.read_bytes() for file in processed.rglob("*") if file.is_file()} == before
+    fits = [*(processed / Fit.folder()).rglob("*.parquet")]
+    assert fits
+    for file in fits:  # copies, of the same time, and not made anew
+        copied = made._places.processed / file.relative_to(processed)
+        assert copied.stat().st_mtime_ns == file.stat().st_mtime_ns
+    with pytest.raises(BadRequest, match=r"loaded from .*study: add the log to that study"):
+        made.save(folder / "other")
+
+
+def test_a_study_that_cannot_be_loaded_says_why(folder, tmp_path):
+    for file, content, text in (
+        ("study.toml", (folder / "study.toml").read_text().replace('"pushed"', '"new"'), "'new' stands for the log"),
+        ("second.csv", "no numbers", "a task failed"),
+    ):
+        other = tmp_path / file / "raw" / "study"
+        shutil.copytree(folder, other)
+        (other / file).write_text(content)
+        with pytest.raises(BadRequest, match=text):
+            davinci_forces.load(other)
+
+
+def test_a_robot_may_be_a_dict_which_is_saved(folder, identified, tmp_path):
+    described = tomllib.loads((folder / "arm.toml").read_text())
+    arguments = {"dq": FIRST.dq, "joints": JOINT, "period": 2.0}
+    made, same = (
+        davinci_forces.identify(robot, FIRST.t, FIRST.q, FIRST.tau, **arguments)
+        for robot in (described, folder / "arm.toml")
+    )
+    assert_equal_numbers(made.record[0], same.record[0])
+    saved = reading.read(made.save(tmp_path / "raw" / "of-dict"))
+    assert saved.robot.joints == same.robot.joints
+    described["joint"][0] |= {"kind": "round", "gear_ratio": 0}
+    with pytest.raises(BadRequest, match=r"gear_ratio must be(?s:.)*kind must be"):
+        davinci_forces.identify(described, FIRST.t, FIRST.q, FIRST.tau, **arguments)
+
+
 def test_a_constant_offset_is_subtracted_where_free_windows_are_given(identified):
     about = (PUSHED.t, PUSHED.q, PUSHED.tau + 0.7, PUSHED.dq)
     plain, centred = (identified.external_effort(*about, free=free) for free in ((), [(0.0, 3.5), (8.0, 14.0)]))
@@ -218,7 +270,7 @@ def test_data_frames_give_the_numbers_of_arrays_with_joints_by_their_names():
 
 def test_nothing_is_printed_and_the_folder_is_removed_with_the_object(capfd):
     fitted = davinci_forces.identify(arm.ARM, FIRST.t, FIRST.q, FIRST.tau, joints=JOINT)
-    home = fitted._places.raw.parents[1]
+    home = fitted._home
     assert home.is_dir()
     assert capfd.readouterr() == ("", "")
     del fitted

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from davinci_forces.filters.online import Stream
     from davinci_forces.robots.robot import Robot
 
-__all__ = ["identify", "read", "results", "robot", "run", "stream"]
+__all__ = ["identify", "load", "read", "results", "robot", "run", "stream"]
 __version__ = "0.2.0"  # pyproject.toml and the citation state it, too
 
 
 def identify(
-    robot: "str | Path | Robot",
+    robot: "str | Path | Robot | Mapping[str, Any]",
     t: Any,
     q: Any,
     tau: Any,
@@ -30,12 +30,13 @@ def identify(
 ) -> "IdentifiedArm":
     """Identify the models of a robot's joints from arrays of free motion, as the stages do from a study's logs.
 
-    `robot` is a name, a .toml or .urdf file, or a Robot.  `t` (n,) is in s.  `q`, `tau` and, where measured, `dq` are
-    (n,) or (n, joints) in SI, arrays or pandas objects.  Lists of arrays are several logs.  `joints` names the columns;
-    without it, the names of a DataFrame do, or the columns are all joints of the robot.  `period` [s] is that of the
-    excitation, one for all logs or one a log; without it, it is detected.  `settings` are those of a study.  `tau` are
-    efforts at the joints [N m or N]: multiply a motor current by gear ratio and torque constant first.  `roles` has
-    "identification" or "validation" for each log: bands and levels are then those of logs that no fit used.
+    `robot` is a name, a .toml or .urdf file, a dict with the keys of such a TOML file, or a Robot.  `t` (n,) is in s.
+    `q`, `tau` and, where measured, `dq` are (n,) or (n, joints) in SI, arrays or pandas objects.  Lists of arrays are
+    several logs.  `joints` names the columns; without it, the names of a DataFrame do, or the columns are all joints of
+    the robot.  `period` [s] is that of the excitation, one for all logs or one a log; without it, it is detected.
+    `settings` are those of a study.  `tau` are efforts at the joints [N m or N]: multiply a motor current by gear ratio
+    and torque constant first.  `roles` has "identification" or "validation" for each log: bands and levels are then
+    those of logs that no fit used.
 
     >>> arm = davinci_forces.identify("davinci", t, q, tau, joints="hand_roll")
     >>> arm.parameters["parameter"].tolist()[:2]
@@ -59,6 +60,26 @@ def identify(
     from davinci_forces import arrays
 
     return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings, roles=roles)
+
+
+def load(study: str | Path) -> "IdentifiedArm":
+    """Load the identified models of a study for arrays: `load("raw/mine").external_effort(t, q, tau)`.
+
+    What is not up to date runs first.  Arrays have a column for each joint with a model, `joints` names them, of
+    positions and efforts at the joints in SI, after sign, offset and gear ratio.
+
+    Raises
+    ------
+    BadRequest
+        If a task fails, or no joint has a model.
+    """
+    from davinci_forces.runner.processes import arithmetic
+
+    arithmetic.pin()
+    from davinci_forces import arrays
+    from davinci_forces.runner import runs
+
+    return arrays.load(runs.single_study(Path(study)))
 
 
 def read(study: str | Path, record: str, **about: object) -> "pd.DataFrame":

@@ -1,10 +1,11 @@
 """Identify a robot, and estimate its external efforts, from arrays: the stages run on a study in a temporary folder."""
 
+import os
 import shutil
 import tempfile
 import warnings
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -36,11 +37,13 @@ from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
 from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, is_small, percent
 from davinci_forces.robots import Robot
+from davinci_forces.robots.from_toml import robot_of
+from davinci_forces.runner import runs
 from davinci_forces.runner.console import Console, table
+from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.results.dataframes import as_frame
 from davinci_forces.runner.runner import Runner
-from davinci_forces.runner.runs import folders
-from davinci_forces.study import LogEntry, Settings, Study
+from davinci_forces.study import LogEntry, Study
 from davinci_forces.study.entries import entries_of
 from davinci_forces.study.reading import settings_of
 from davinci_forces.toml import TomlFile, TomlTable, in_toml
@@ -56,14 +59,20 @@ Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.
 
 
 def identify(
-    robot: str | Path | Robot, t: Samples, q: Samples, tau: Samples, *,
+    robot: str | Path | Robot | Mapping[str, Any], t: Samples, q: Samples, tau: Samples, *,
     period: float | Sequence[float] | None = None, dq: Samples = None,
     joints: str | Sequence[str] | None = None, settings: Mapping[str, Any] | None = None,
     roles: Sequence[str] | None = None,
 ) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
     table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
-    arm = robot if isinstance(robot, Robot) else robots.load(Path(robot).name, Path(robot).parent)
+    if isinstance(robot, Mapping):
+        described = TomlTable(dict(robot), TomlFile("robot", {}))
+        arm = robot_of(described, "arm")
+        refuse(described)
+        assert arm is not None
+    else:
+        arm = robot if isinstance(robot, Robot) else robots.load(Path(robot).name, Path(robot).parent)
     used = settings_of(table, arm)
     refuse(table)
     several = isinstance(t, list | tuple) and len(t) > 0 and np.ndim(t[0]) > 0
@@ -79,7 +88,47 @@ def identify(
             raise BadRequest(f"t has {len(times)} logs, but {name} has {len(x)}; give a list of as many for each")
     moved = joints_of(arm, given["q"][0], [joints] if isinstance(joints, str) else joints)
     logs = columns_of(times, given, moved)
-    return IdentifiedArm(arm, used, moved, logs, periods, used_as, (robot, dict(settings or {})))
+    numbers = [used_as[: i + 1].count(role) for i, role in enumerate(used_as)]
+    names = [f"{role}-{i}" if len(logs) > 1 else role for role, i in zip(used_as, numbers, strict=True)]
+
+    def study_in(home: Path) -> Study:
+        entries = [save_log(arm, home, *log) for log in zip(names, logs, periods, used_as, strict=True)]
+        return Study(home, "Arrays", arm, False, used, tuple(entries))
+
+    return IdentifiedArm(study_in, moved, (robot, dict(settings or {})))
+
+
+def load(folder: Path) -> "IdentifiedArm":
+    """Load the identified models of a study, to use them on arrays; see `davinci_forces.load`."""
+    study = replace(runs.load(folder), folder=folder.resolve())
+    if NEW in [log.name for log in study.logs]:
+        raise BadRequest(f"{folder}: {NEW!r} stands for the log of arrays; give the log of that name another")
+    if not runs.run(folder, [IDENTIFIED], verbosity="quiet"):
+        raise BadRequest(f"{folder}: a task failed, so there is no model; correct its log, or leave it out")
+
+    def study_in(home: Path) -> Study:
+        shutil.copytree(runs.folders(folder, None, None).processed, folders_in(home).processed)
+        return study
+
+    return IdentifiedArm(study_in)
+
+
+def folders_in(home: Path) -> Folders:
+    """The folders of an arm: of its logs, which a study's need not be in, and of what the stages make of them."""
+    return Folders(home, home / "processed", home / "reports")
+
+
+def save_log(
+    robot: Robot, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED, **windows: Any
+) -> LogEntry:
+    """Save a log, and describe it as study.toml does."""
+    np.savez(folder / f"{name}.npz", **columns)  # type: ignore[arg-type]
+    log = {"name": name, "file": f"{name}.npz", "role": role, "channels": {column: column for column in columns}}
+    log |= windows
+    table = TomlTable({"log": [log | ({} if period is None else {"period": period})]}, TomlFile(name, {}))
+    [entry] = entries_of(table, robot)
+    refuse(table)
+    return entry
 
 
 def refuse(table: TomlTable) -> None:
@@ -160,23 +209,19 @@ class IdentifiedArm:
     """
 
     def __init__(
-        self, robot: Robot, settings: Settings, joints: Sequence[str], logs: Sequence[Columns],
-        periods: Sequence[float | None], roles: Sequence[str], arguments: tuple[str | Path | Robot, dict[str, Any]],
+        self, study_in: Callable[[Path], Study], joints: Sequence[str] = (),
+        arguments: tuple[str | Path | Robot | Mapping[str, Any], dict[str, Any]] | None = None,
     ) -> None:  # fmt: skip
-        self.robot, self.joints = robot, tuple(joints)
-        self._arguments = arguments  # robot and settings as `identify` got them
-        home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
-        weakref.finalize(self, shutil.rmtree, home, ignore_errors=True)
-        folder = home / "raw" / "arrays"
-        folder.mkdir(parents=True)
-        numbers = [roles[: i + 1].count(role) for i, role in enumerate(roles)]
-        names = [f"{role}-{i}" if len(logs) > 1 else role for role, i in zip(roles, numbers, strict=True)]
-        entries = [self._saved(folder, *log) for log in zip(names, logs, periods, roles, strict=True)]
-        self._study = Study(folder, "Arrays", robot, False, settings, tuple(entries))
-        self._places = folders(folder, None, None)
+        self._arguments = arguments  # robot and settings as `identify` got them; None of a study
+        self._home = Path(tempfile.mkdtemp(prefix="davinci-forces-"))
+        weakref.finalize(self, shutil.rmtree, self._home, ignore_errors=True)
+        self._study = study = study_in(self._home)
+        self.robot, self._places = study.robot, replace(folders_in(self._home), raw=study.folder)
         reading = self._run(IDENTIFIED)
-        identified = Identified(robot, [*reading(Fit), *reading(Choice)])
-        fits = {joint: identified.fit_of(joint, settings.fit) for joint in self.joints}
+        identified = Identified(study.robot, [*reading(Fit), *reading(Choice)])
+        each = joints or [joint.name for joint in study.robot.joints]
+        fits = {joint: identified.fit_of(joint, study.settings.fit) for joint in each}
+        self.joints = tuple(joint for joint in each if joints or fits[joint])
         self.diagnostics = texts_of(reading(Diagnostic))
         if not any(fits.values()):
             raise BadRequest("\n".join(["no joint has a model", *self.diagnostics]))
@@ -262,25 +307,31 @@ class IdentifiedArm:
         BadRequest
             If the robot was given as an object, of which there is no file, or two logs have one name.
         """
+        if self._arguments is None:
+            raise BadRequest(f"this arm was loaded from {self._study.folder}: add the log to that study instead")
         target, (robot, settings) = Path(folder), self._arguments
         if taken := sorted({log.name for log in self._study.logs} & {*contact_logs}):
             raise BadRequest(f"{taken[0]} is the name of an identified log; give the other log another name")
         if isinstance(robot, Robot):
             raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
-        lines = ['title = "From arrays"', f"robot = {in_toml(Path(robot).name)}", "simulated = false"]
+        file = "robot.toml" if isinstance(robot, Mapping) else Path(robot).name
+        lines = ['title = "From arrays"', f"robot = {in_toml(file)}", "simulated = false"]
         lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
         more = [self._contact_log(name, *effort._log) for name, effort in contact_logs.items()]
         logs = (*self._study.logs, *more)
         for log in logs:
-            lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(*log.files)}"]
+            lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(Path(*log.files).name)}"]
             lines += [f"role = {in_toml(log.role)}", *([f"period = {log.period}"] if log.period else [])]
             windows = {"contact": log.contact, "free": log.free}
             lines += [f"{name} = {in_toml([list(window) for window in of])}" for name, of in windows.items() if of]
             lines += ["[log.channels]"]
             lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
-        files = [self._study.folder / file for log in logs for file in log.files]
-        files += [Path(robot)] if Path(robot).suffix else []
-        contents = {file.name: read_bytes(file) for file in files}
+        places = [self._study.folder / place for log in logs for place in log.files]
+        contents = {place.name: read_bytes(place) for place in places}
+        if isinstance(robot, Mapping):
+            contents[file] = "".join(f"{key} = {in_toml(value)}\n" for key, value in robot.items()).encode()
+        elif Path(robot).suffix:
+            contents[file] = read_bytes(Path(robot))
         write_folder(target, contents | {"study.toml": ("\n".join(lines) + "\n").encode()})
         return target
 
@@ -314,18 +365,6 @@ class IdentifiedArm:
     def _effort_label(self, joint: str) -> str:
         return f"effort [{self.robot.joint(joint).unit('{effort}')}]"
 
-    def _saved(
-        self, folder: Path, name: str, columns: Columns, period: float | None, role: str = FITTED, **windows: Any
-    ) -> LogEntry:
-        """Save a log, and describe it as study.toml does."""
-        np.savez(folder / f"{name}.npz", **columns)  # type: ignore[arg-type]
-        log = {"name": name, "file": f"{name}.npz", "role": role, "channels": {column: column for column in columns}}
-        log |= windows
-        table = TomlTable({"log": [log | ({} if period is None else {"period": period})]}, TomlFile(name, {}))
-        [entry] = entries_of(table, self.robot)
-        refuse(table)
-        return entry
-
     def _columns(self, t: Samples, **given: Samples) -> Columns:
         [columns] = columns_of([t], {name: [x] for name, x in given.items() if x is not None}, self.joints)
         return columns
@@ -334,7 +373,8 @@ class IdentifiedArm:
         windows, length = windows or {}, float(columns["time"][-1] - columns["time"][0])
         is_free = "contact" not in windows and any(a <= 0.0 and b >= length for a, b in windows.get("free", ()))
         role = VALIDATION if is_free else "contact"  # free throughout
-        return self._saved(self._study.folder, name, columns, None, role, **windows)
+        entry = save_log(self.robot, self._home, name, columns, None, role, **windows)
+        return replace(entry, files=(os.path.relpath(self._home / entry.files[0], self._study.folder),))
 
     def _run(self, stage: str, *more: LogEntry) -> Any:
         """Run the stages up to this one, without output; return what reads the records of a kind."""

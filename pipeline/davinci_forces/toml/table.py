@@ -93,6 +93,8 @@ def in_toml(value: object) -> str:
     """A text, number, truth value, list or table of them as TOML; but for tables, JSON has the same form."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{in_toml(str(key))} = {in_toml(of)}' for key, of in value.items())} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(in_toml, value))}]"
     return json.dumps(value, ensure_ascii=False)
 
 
