@@ -7,6 +7,7 @@ import numpy as np
 from davinci_forces.exports.identified import Export, ExportedJoint, ExportOrigin
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.stepping import covariances
+from davinci_forces.identification.regression import parameter_columns
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.model import ArmMotion
@@ -60,16 +61,14 @@ def possible(model, seed: int = 0) -> np.ndarray:
 
 def fit_of(model, structure: str, theta: np.ndarray, estimator: str = "ridge") -> Fit:
     """The record of a fit."""
-    parameters, m = model.parameters, len(model.efforts)
-    names, phi, unit = (np.array([getattr(p, key) for p in parameters], object) for key in ("name", "typst", "unit"))
-    scale, positive = np.array([p.scale for p in parameters]), np.array([float(p.positive) for p in parameters])
+    m = len(model.efforts)
     std = 0.1 * np.abs(theta)
     return Fit(
         group=model.group, model=model.name, estimator=estimator, structure=structure, cutoff=(10.0,) * m,
         effort_lag=(0.0,) * m, logs=("one",), samples=1, periods=1, mse=0.0, mse_std=0.0, r2=1.0, r2_std=0.0,
         condition=1.0, correlated_lags=1,
-        parameter=names, phi=phi, unit=unit, scale=scale, positive=positive, theta=theta, theta_std=std,
-        theta_std_noise=std, theta_std_model=std, theta_std_classical=std,
+        **parameter_columns(model), theta=theta, theta_std=std, theta_std_noise=std,
+        theta_std_model=std, theta_std_classical=std,
     )  # fmt: skip
 
 

@@ -16,7 +16,9 @@ def fit(model: str) -> Fit:
     """A fit of the roll, each of its parameters 1."""
     described = independent(ROLL) if model == "independent" else coupled_arm(davinci.ROBOT, [0], [()], group=ROLL.name)
     names = np.array([parameter.name for parameter in described.parameters], object)
-    columns = dict.fromkeys(Fit.columns(), np.zeros(len(names))) | dict.fromkeys(("parameter", "phi", "unit"), names)
+    columns = dict.fromkeys(Fit.columns(), np.zeros(len(names))) | dict.fromkeys(
+        ("parameter", "phi", "unit", "combination"), names
+    )
     about = {"structure": model, "cutoff": (17.0,), "effort_lag": (0.0,)}
     about |= {"group": ROLL.name, "model": model, "estimator": "lse", "logs": ("a",), "theta": np.ones(len(names))}
     return Fit(**(dict.fromkeys(Fit.scalars(), 1) | columns | about))

@@ -539,7 +539,10 @@ def test_the_lines_of_python_of_the_readme_and_of_streams_run(analysed, tmp_path
 def test_the_lines_on_the_force_at_the_tip_give_the_force_that_the_report_gives(monkeypatch, capsys):
     efforts = test_tip.efforts("davinci", test_tip.PUSH) + test_tip.noise(3)
     tracks = test_tip.tracks("davinci", efforts)
-    rows = [{name: getattr(t, name) for name in ("t", "q", "tau_ext_smooth", "tau_ext_smooth_std")} for t in tracks]
+    rows = [
+        {name: getattr(t, name) for name in ("t", "q", "tau_ext_smooth", "tau_ext_smooth_std", "tau_ext_direct")}
+        for t in tracks
+    ]
     every = pd.concat([pd.DataFrame(row | {"joint": t.joint}) for row, t in zip(rows, tracks, strict=True)])
     monkeypatch.setattr(davinci_forces, "read", lambda *_, **__: every)
     made: dict = {}
@@ -547,7 +550,10 @@ def test_the_lines_on_the_force_at_the_tip_give_the_force_that_the_report_gives(
     force = test_tip.run("davinci", tracks)[TipForce]
     np.testing.assert_allclose(made["force"], np.column_stack([force.f_x, force.f_y, force.f_z]), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(made["C"][:, 0, 1], force.c_xy, rtol=1e-6)
-    assert "left in the efforts: 0.0" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "left in the efforts: 0.0" in said
+    printed = re.search(r"without smoothing: \[(.*?)\]", said)[1]
+    np.testing.assert_allclose(made["J"][made["k"]].T @ np.array(printed.split(), float), made["direct"], rtol=1e-6)
 
 
 def test_estimators_are_those_that_there_are():

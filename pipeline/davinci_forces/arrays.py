@@ -236,9 +236,13 @@ class IdentifiedArm:
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """The parameters of each fit with their standard errors and units."""
-        columns = {"parameter": "parameter", "theta": "value", "theta_std": "std", "unit": "unit"}
-        frames = [as_frame(fit)[["group", "model", "estimator", *columns]] for fit in self.record]
+        """The parameters of each fit with their standard errors and units.
+
+        A parameter of coupled links is a sum that it leads: `combination`; `described` is that of the description.
+        """
+        columns = {"theta": "value", "theta_std": "std"}
+        names = ["group", "model", "estimator", "parameter", *columns, "unit", "combination", "described"]
+        frames = [as_frame(fit)[names] for fit in self.record]
         return pd.concat(frames, ignore_index=True).rename(columns=columns)
 
     def predict(self, t: Samples, q: Samples, dq: Samples = None) -> pd.DataFrame:

@@ -671,6 +671,28 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     assert "together" not in text
 
 
+def test_parameters_of_links_stand_beside_what_the_description_says_and_what_they_are_sums_of(full: Context):
+    chosen = full.shown_fit("hand_roll")
+    phi = np.array(["partial tau"] * len(chosen), object)
+    sums = np.array(["+1 mx of upper +0.4 m of fore", *[""] * (len(chosen) - 1)], object)
+    described = np.array([1.25, *[np.nan] * (len(chosen) - 1)])
+    of_links = replace(chosen, structure="coupled", phi=phi, combination=sums, described=described)
+
+    def blocks(fit):
+        fits = [fit if other is chosen else other for other in full.catalogue.records(Fit)]
+        records = Catalogue(lambda kind: fits if kind is Fit else full.catalogue.records(kind))
+        return joints.link_parameters(replace(full, catalogue=records), ["hand_roll"])
+
+    table, folded = blocks(of_links)
+    assert table.header[-1] == "Described"
+    assert [row[-1] for row in table.rows] == ["1.25"] + ["–"] * (len(chosen) - 1)
+    assert "description" in table.caption
+    [of_sums] = folded.blocks
+    assert of_sums.rows == ((str(chosen.parameter[0]), "+1 mx of upper +0.4 m of fore"),)
+    unknown, _ = blocks(replace(of_links, described=described * np.nan))
+    assert unknown.header[-1] == "$z$"
+
+
 def test_a_wrong_unit_is_the_first_to_look_at(lab: Lab, catalogue: Catalogue):
     wrong = diagnostic("resample", "push.hand_roll", "warning", "the logged velocity is twice its derivative")
     said = Catalogue(lambda kind: [*catalogue.records(kind), *([wrong] if kind is Diagnostic else [])])
@@ -1224,7 +1246,7 @@ def test_page_one_says_which_panels_show_no_contact_log_and_where_dots_stand(ful
     assert "Dots" not in told
     told = summary.caption(full, contacts, [replace(panels[0], marks=(dot,))])
     assert told.endswith(
-        " Dots: peaks, that of a plateau at its end, beyond the curve by what smoothing takes off them."
+        " Dots: peaks, of a plateau where it is left, beyond the curve by what smoothing takes off them."
     )
 
 

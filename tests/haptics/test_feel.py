@@ -31,7 +31,9 @@ def fit(theta=THETA, estimator="lse") -> Fit:
     joint = davinci.ROBOT.joint("instrument_slide")
     names = np.array([term.name for term in joint.terms], object)
     numbers = dict.fromkeys(Fit.scalars(), 1)
-    columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | dict.fromkeys(("parameter", "phi", "unit"), names)
+    columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | dict.fromkeys(
+        ("parameter", "phi", "unit", "combination"), names
+    )
     about = {"structure": "independent", "cutoff": (17.0,), "effort_lag": (0.0,)}
     about |= {"group": joint.name, "model": "independent", "estimator": estimator, "logs": ("a",)}
     return Fit(

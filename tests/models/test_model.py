@@ -1,5 +1,6 @@
 """Models: of joints by themselves and of a coupled arm, with friction that remembers and without."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.filters import FILTERS, sample, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.identification.observations import observe
+from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
 from davinci_forces.maths.models import terms
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -65,6 +67,29 @@ def true_effort(motion):
     tau[:, 0] += 0.5 * deflection(motion, 0, 0.02)[0]
     tau[:, 1] += 0.3 * np.sign(motion.dq[:, 1])
     return tau
+
+
+def test_a_parameter_says_of_which_others_it_is_the_sum_and_what_known_bodies_make_of_it():
+    model, b = coupled(), len(coupled().base.columns)
+    L, of_bodies = 10 * len(CHAIN.links), model.of_bodies(BODIES)
+    names = [f"{name} of {link}" for link in CHAIN.links for name in PARAMETERS]
+    values = dict(zip(names, BODIES.parameters(2), strict=True))
+    sums = 0
+    for parameter, value, column in zip(model.parameters[:b], of_bodies, model.base.columns, strict=False):
+        sum_of = re.findall(r"([+-][\d.e-]+) (.*?)(?= [+-]\d|$)", parameter.combination) or [("1", parameter.name)]
+        assert parameter.name in [name for _, name in sum_of]
+        if column >= L:  # of a drive or a cable, of which bodies say nothing
+            assert np.isnan(value)
+            continue
+        sums += len(sum_of) > 1
+        parts = np.array([float(factor) * values.get(name, 0.0) for factor, name in sum_of])
+        assert_allclose(value, parts.sum(), atol=1e-3 * np.abs(parts).sum() + 1e-9)  # factors have four digits
+    assert sums > 3
+    assert np.isnan(of_bodies[b:]).all()
+    motion = wandering(500)
+    known = np.where(np.isnan(of_bodies), 0.0, of_bodies)
+    tau = inverse_dynamics(CHAIN, BODIES, motion.q, motion.dq, motion.ddq)
+    assert_allclose(model.regressor(motion).Phi @ known, tau, rtol=1e-6, atol=1e-6 * np.abs(tau).max())
 
 
 def test_the_effort_of_a_coupled_arm_is_that_of_its_links_drives_and_friction():

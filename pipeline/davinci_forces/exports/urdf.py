@@ -16,7 +16,7 @@ from davinci_forces.identification.joint_models import Identified, LogModels
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.estimation.conic import LENGTH, complete
-from davinci_forces.maths.mechanics.bodies import PARAMETERS, as_bodies
+from davinci_forces.maths.mechanics.bodies import as_bodies
 from davinci_forces.maths.models.coupled import ADDED, CoupledArm
 from davinci_forces.maths.models.independent import add
 from davinci_forces.maths.models.memory import friction_state
@@ -30,7 +30,6 @@ from davinci_forces.robots.urdf import writing
 TABLE = "arm.md"
 CONSISTENT = "consistent"  # estimator
 NEGLIGIBLE_MASS = 1e-8  # [kg] of a link: the solver's error of 0
-ROUNDING = 1e-9  # of a coefficient that is 0
 PREFERENCE = 10.0  # price of efforts of drives, cables and offsets over that of links, which explain what they can
 FreeLogs = tuple[list[LogModels], dict[str, list[Array]]]  # of free motion; and the efforts of each joint in them
 
@@ -143,13 +142,8 @@ def remaining_effort(about: ModelTerm, value: float, model: CoupledArm, motion: 
 
 
 def _tables(export: Export, arm: IdentifiedArm, free: FreeLogs, lost: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    fit, names = arm.fit, [f"{which} of {link}" for link in arm.model.chain.links for which in PARAMETERS]
-    rows = arm.model.mechanism.matrix[: len(arm.model.base.columns), : len(names)]
-    sums = [
-        " ".join(f"{c:+.4g} {name}" for c, name in zip(row, names, strict=True) if abs(c) > ROUNDING) for row in rows
-    ]
-    sums += [""] * (len(fit.theta) - len(sums))
-    numbers = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, sums, strict=True)
+    fit = arm.fit
+    numbers = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, fit.combination, strict=True)
     yield "\n# Identified parameters\n\nOnly these combinations follow from the logs."
     yield "Axes of a link have z along its joint."
     yield from _table("parameter", "value", "standard error", "unit", "combination")

@@ -76,9 +76,11 @@ def page(topic: str) -> Page:
         return by_topic[topic]
     words = rf"(?<!\w){re.escape(topic)}s?(?!\w)"
     rows = re.findall(rf"(?mi)^\| ([^|]*{words}[^|]*) \|(.*)\|$", by_topic[TERMS].text)
-    rows = rows or re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text)
-    if rows:
-        return replace(by_topic[TERMS], write=lambda: "\n\n".join(f"**{term}**:{means}" for term, means in rows))
+    others = re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text) if not rows else []
+    if rows or others:
+        said = [f"“{topic}” is no term of its own, but stands in what these mean:"] * (not rows)
+        said += [f"**{term}**:{means}" for term, means in rows or others]
+        return replace(by_topic[TERMS], write=lambda: "\n\n".join(said))
     named = re.compile(rf"(?m)^\| `{re.escape(topic)}` \|(.*)\|$")
     rows = [(page.topic, row) for page in by_topic.values() for row in named.findall(page.text)]
     if rows:

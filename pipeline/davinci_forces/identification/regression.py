@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from davinci_forces.estimators.problem import NO_PRIOR, ROWS, Prior, Regression
 from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.physical import ROUNDING, Box
@@ -20,11 +22,14 @@ from davinci_forces.records.recordings import FilteredMotion
 from davinci_forces.robots.robot import Joint
 
 
-def parameter_columns(model: Model) -> dict[str, NDArray[Any]]:
-    """What a Fit states of each parameter (p,) of a model."""
-    rows = [(p.name, p.typst, p.unit, p.scale, float(p.positive)) for p in model.parameters]
-    columns = zip(("parameter", "phi", "unit", "scale", "positive"), zip(*rows, strict=True), strict=True)
-    return {name: np.array(column, object if isinstance(column[0], str) else float) for name, column in columns}
+def parameter_columns(model: Model, bodies: Bodies | None = None) -> dict[str, NDArray[Any]]:
+    """What a Fit states of each parameter (p,) of a model, and what the robot's bodies, if known, say of it."""
+    rows = [(p.name, p.typst, p.unit, p.combination, p.scale, float(p.positive)) for p in model.parameters]
+    names = ("parameter", "phi", "unit", "combination", "scale", "positive")
+    columns = zip(names, zip(*rows, strict=True), strict=True)
+    of_bodies = model.of_bodies(bodies) if bodies and isinstance(model, CoupledArm) else np.full(len(rows), np.nan)
+    texts_and_numbers = {name: np.array(x, object if isinstance(x[0], str) else float) for name, x in columns}
+    return texts_and_numbers | {"described": of_bodies}
 
 
 def pose(model: IndependentJoint, t: Trajectory, known: Prior = NO_PRIOR) -> Regression:

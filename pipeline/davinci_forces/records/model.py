@@ -9,6 +9,7 @@ class Fit(Record):
     """The parameters of a model, estimated by one estimator from all identification logs."""
 
     KEY = ("group", "model", "estimator")
+    UNKNOWN = ("described",)
     ROWS = "parameter"
     PUBLISHED = (
         "fit.{group}.{model}.{estimator}.{slug}: =theta± std_noise=theta_std_noise std_model=theta_std_model "
@@ -34,8 +35,10 @@ class Fit(Record):
     parameter: Labels
     phi: Labels
     unit: Labels
+    combination: Labels
     scale: Column
     positive: Column
+    described: Column
     theta: Column
     theta_std: Column
     theta_std_noise: Column

@@ -6,13 +6,14 @@ pi are the inertial parameters of all links, and a rotor inertia, a spring and a
 the identifiable combinations of pi.  A counterweight is a link like any other.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Integers
-from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, BaseParameters, base_parameters
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, RANDOM_SAMPLES, BaseParameters, Bodies, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks
 from davinci_forces.maths.mechanics.rigid_body import regressor
@@ -24,6 +25,7 @@ ADDED = ("rotor inertia", "spring", "offset")  # parameters of the drive and the
 NOT_NEGATIVE = (True, True, False)  # of `ADDED`: a spring pulls back, and an offset has either sign
 LINK_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 ADDED_UNITS = ("{inertia}", "{effort}/{position}", "{effort}")
+FACTOR_ROUNDING = 1e-9  # of a factor that is 0
 LINK_SAMPLES = 1 << 12  # whose regressor of all links is in memory at once; few of its columns are used
 
 
@@ -53,12 +55,26 @@ class CoupledArm:
         """The parameters of links and drives that the rows' efforts identify under a rich motion of all joints."""
         return arm_base_parameters(self.chain, len(self.joints), self.rows)
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The base parameters, each named by the column of pi that it leads with, then the friction of each row."""
-        L = 10 * len(self.chain.links)
-        names = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in self.base.columns.tolist()]
-        return (*names, *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms))
+        L, base = 10 * len(self.chain.links), self.base
+        columns = range(base.combination.shape[1])
+        every = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in columns]
+        sums = [combination(row, every) for row in base.combination]
+        leading = [every[c]._replace(combination=text) for c, text in zip(base.columns, sums, strict=True)]
+        return (
+            *leading,
+            *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms),
+        )
+
+    def of_bodies(self, bodies: Bodies) -> Array:
+        """The parameters (p,) of an arm with these bodies, without rotors; NaN for drives, cables and friction."""
+        L, base = 10 * len(self.chain.links), self.base
+        values = base.combination[:, :L] @ bodies.parameters(len(self.joints))
+        described, theta = base.columns < L, np.full(len(self.parameters), np.nan)
+        theta[: len(values)][described] = np.where(np.abs(values) > FACTOR_ROUNDING, values, 0.0)[described]
+        return theta
 
     @property
     def displacements(self) -> set[tuple[int, float]]:
@@ -150,6 +166,14 @@ def of_links(
     Y = regressor(chain, q, dq, ddq, joints, int(of_bodies.max(initial=-1)) // 10 + 1)[:, :, of_bodies]
     added = [x[:, :, None] * identity for x in (ddq[:, joints], q[:, joints], np.ones_like(q[:, joints]))]
     return np.concatenate([Y, np.concatenate(added, axis=2)[:, :, columns[columns >= L] - L]], axis=2)
+
+
+def combination(factors: Array, parameters: Sequence[Parameter]) -> str:
+    """The sum of parameters, each times its factor, as text; "" of a single one."""
+    terms = [
+        f"{c:+.4g} {p.name}" for c, p in zip(factors.tolist(), parameters, strict=True) if abs(c) > FACTOR_ROUNDING
+    ]
+    return " ".join(terms) if terms[1:] else ""
 
 
 @cache

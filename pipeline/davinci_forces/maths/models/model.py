@@ -46,6 +46,7 @@ class Parameter(NamedTuple):
     unit: str
     positive: bool  # whether physics excludes negative values
     scale: float = 0.0  # displacement or velocity in its column, in the joint's units; 0 for none
+    combination: str = ""  # of the parameters of links and drives that it is, if it is one
 
 
 class ArmMotion(NamedTuple):

@@ -15,6 +15,6 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
          "choice", "prediction", "noise", "filters", "runs", "innovations", "ground_truth", "methods", "provenance",
          "review"),
     ),
-    "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation", "thesis")),
+    "robot": ("The robot", ("robot", "control", "excitation", "thesis")),
 }  # fmt: skip
 SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)

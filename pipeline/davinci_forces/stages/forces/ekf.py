@@ -118,6 +118,6 @@ def drift_warning(model: JointModel, offset: DayOffset, unit: str) -> Diagnostic
     """Warn of an offset that changes between the free windows."""
     drift = f"{offset.drift:.3g} {unit}, with a standard error of {offset.drift_std:.2g} {unit}"
     message = f"{model.log}/{model.joint}: the offset drifts within the free windows by {drift}"
-    remedy = "shorten the log, or state free windows nearer to where efforts matter, before and after"
-    text = f"{message}, so efforts between them are uncertain by as much; {remedy}"
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", text)
+    follows = "so an effort far from them may be off by half of it more than its error says"
+    remedy = "a shorter log, or free windows closer around what matters, make that less"
+    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", f"{message}, {follows}; {remedy}")

@@ -95,7 +95,7 @@ def fits(
 ) -> Iterator[Fit | Diagnostic]:
     """Fit a candidate to all logs; `with_consistent` also within the parameters that a mechanism can have."""
     estimates = list(parameters(candidate, count, others))
-    yield from (fit_record(candidate, candidate.estimator, part, estimate) for part, estimate in estimates)
+    yield from (fit_record(candidate, candidate.estimator, *pair, robot) for pair in estimates)
     if with_consistent and candidate.variant != "independent":
         yield from consistent_fits(candidate, estimates, robot)
 
@@ -232,7 +232,7 @@ def consistent_fits(
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
             yield diagnostic("choose", model.group, "note", message)
             continue
-        yield fit_record(candidate, "consistent", part, estimate)
+        yield fit_record(candidate, "consistent", part, estimate, robot)
         if excess > NEGLIGIBLE_EXCESS:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             errors = zip(model.efforts, rmse, rmse_free, units, strict=True)
@@ -242,9 +242,10 @@ def consistent_fits(
             yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 
-def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estimate: BlockEstimate) -> Fit:
+def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estimate: BlockEstimate, robot: Robot) -> Fit:
     """The Fit of a part of a candidate to all logs."""
     model, log = part.model, part.library.logs[0]
+    bodies = None if any(joint.effort for joint in robot.joints) else robot.bodies  # in A, their factor is unknown
     processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
     return Fit.like(
         estimate,
@@ -257,7 +258,7 @@ def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estima
         logs=tuple(log.records[0].log for log in part.library.logs),
         periods=0,
         correlated_lags=0,
-        **parameter_columns(model),
+        **parameter_columns(model, bodies),
     )
 
 

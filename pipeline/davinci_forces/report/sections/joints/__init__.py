@@ -158,15 +158,24 @@ def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str =
 def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
     """The parameters of the links of each coupled model in use, which its joints share."""
     used = {fit.key: fit for joint in joints if (fit := context.used_record(joint)) is not None}
-    tables = []
+    tables = list[Block]()
     for fit in used.values():
         rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
         if rows:
-            header = ("", *PARAMETER_HEADER)
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
-            caption = explanation("joints-links", model=fit_name(fit.model, fit.estimator), joints=moved)
-            body = tuple(parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1))
-            tables.append(Table(caption, header, body, f"links-{fit.group}", "lllrrrr"))
+            caption = explanation(
+                "joints-links", group=fit.group, model=fit_name(fit.model, fit.estimator), joints=moved
+            )
+            header: tuple[str, ...] = ("", *PARAMETER_HEADER)
+            body = [parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1)]
+            if np.isfinite(fit.described[rows]).any():
+                header, caption = (*header, "Described"), f"{caption} {explanation('joints-links-described')}"
+                described = (Number(x, digits=3).text for x in fit.described[rows].tolist())
+                body = [(*cells, text) for cells, text in zip(body, described, strict=True)]
+            tables.append(Table(caption, header, tuple(body), f"links-{fit.group}", "lll" + "r" * (len(header) - 3)))
+            sums = tuple((literal(fit.parameter[i]), literal(fit.combination[i])) for i in rows if fit.combination[i])
+            table = Table(explanation("joints-links-sums"), ("Parameter", "Sum"), sums, f"sums-{fit.group}", "ll")
+            tables.append(OnScreen("What the parameters of the links are sums of", f"links-sums-{fit.group}", (table,)))
     return tuple(tables)
 
 

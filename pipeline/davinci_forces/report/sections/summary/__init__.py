@@ -101,7 +101,7 @@ def caption(context: Context, contacts: list[Contact], panels: list[Panel]) -> s
     is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
     shaded = ", stated contact windows shaded" if is_shaded else ""
     has_dots = any(isinstance(mark, Points) for panel in panels for mark in panel.marks)
-    dots = " Dots: peaks, that of a plateau at its end, beyond the curve by what smoothing takes off them." * has_dots
+    dots = " Dots: peaks, of a plateau where it is left, beyond the curve by what smoothing takes off them." * has_dots
     return f"External effort of each joint{where}{shaded}. {which}{level}{dots}"
 
 
