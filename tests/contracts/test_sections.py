@@ -1197,6 +1197,7 @@ def test_page_one_states_the_largest_force_at_the_tip_and_what_an_ampere_counts(
     )
     assert (
         line == f"**{contact.log}**: force at the tip up to {largest} ({when}), if the arm was touched at its tip alone"
+        f"; without contact, 99 % stay below {full.number(f'tip.{contact.log}.detection_level', 2)}"
     )
     assert np.hypot(np.hypot(contact.f_x, contact.f_y), contact.f_z)[row] == pytest.approx(contact.f_peak[row])
     assert float(line.partition("up to ")[2].partition(" ")[0]) == pytest.approx(contact.f_peak.max(), abs=0.05)

@@ -109,7 +109,8 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         yield (
             f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s{of_all}; in the "
             f"base’s axes x: {x}, y: {y}, z: {z}), "
-            f"if the arm was touched at its tip alone{alone}{beside}"
+            f"if the arm was touched at its tip alone{alone}; without contact, 99 % stay below "
+            f"{context.number(f'tip.{contact.log}.detection_level', 2)}{beside}"
         )
     robot = context.study.robot
     if robot.chain is not None and not context.catalogue.records(TipForce):
