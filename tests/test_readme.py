@@ -408,7 +408,7 @@ def test_terms_are_in_order_and_each_once():
 
 
 PAGE_ONE = (
-    "Verdict", "New path", "Model error", "Relative error", "R2", "Ceiling", "Detection level", "Sought", "Coverage",
+    "Verdict", "New path", "Model error", "Error / effort", "R2", "Ceiling", "Detection level", "Sought", "Coverage",
     "95 % band", "caution", "same path", "at rest", "too narrow", "too wide", "external effort", "free space", "run",
     "stated window", "alarm level", "standard error", "stiffness", "quartiles",
 )  # fmt: skip

@@ -1552,7 +1552,7 @@ def test_a_model_error_of_zero_is_nowhere_printed_as_an_error(full: Context):
     columns = {name: i for i, name in enumerate(tables[0].header)}
     for row in tables[0].rows:
         assert str(row[columns["Model error"]]).startswith("< 0.032 N")
-        assert row[columns["Relative error"]] == "< 4 %"
+        assert row[columns["Error / effort"]] == "< 4 %"
     cells = [cell for table in tables for row in table.rows for cell in row if isinstance(cell, Number)]
     errors = [cell for cell in cells if cell.key.endswith(".model_error")]
     assert len(errors) > len(tables[0].rows)

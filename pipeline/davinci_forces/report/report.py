@@ -31,7 +31,7 @@ LEGEND = (
     "coverage: of the 95 % band"
 )
 HEADER = (
-    "joint", "verdict", "new path", "model error", "relative error", "R2", "ceiling", "detection level",
+    "joint", "verdict", "new path", "model error", "error / effort", "R2", "ceiling", "detection level",
     "alarm level", "coverage",
 )  # fmt: skip
 

@@ -15,7 +15,7 @@ def section(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
     yield Prose(parts.explanation("prediction"))
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
-    header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Relative error", "$R^2$", "Ceiling")
+    header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error / effort", "$R^2$", "Ceiling")
     caption = parts.explanation("prediction-table")
     rows = tuple(row(context, p) for p in used)
     yield from parts.paper_or_screen(Table(caption, header, rows, "prediction-table", "llllrrrrr"))

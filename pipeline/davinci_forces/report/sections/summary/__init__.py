@@ -272,7 +272,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = (
-        "Joint", "Verdict", "New path", "Model error", "Relative error", "$R^2$", "Ceiling", "Detection level",
+        "Joint", "Verdict", "New path", "Model error", "Error / effort", "$R^2$", "Ceiling", "Detection level",
         "Alarm level", *sought, "Coverage",
     )  # fmt: skip
     friction = parts.static_frictions(context, context.catalogue.records(Track))
