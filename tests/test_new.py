@@ -282,12 +282,14 @@ def test_names_that_laboratories_give_are_read_without_an_edit(tmp_path, kind):
 def test_a_name_tells_the_side_of_the_motor_whose_torque_is_to_be_checked(tmp_path):
     t, q, dq = motion(1)
     for effort_name, doubt in (("roll_Imotor", 0), ("Motor torque roll", 1)):
-        columns = {"roll_theta_m": q[:, 0].tolist(), effort_name: effort(q, dq)[:, 0].tolist()}
+        columns = {"roll_theta_m": q[:, 0].tolist(), "roll_omega_m": dq[:, 0].tolist()}
+        columns[effort_name] = effort(q, dq)[:, 0].tolist()
         path = tmp_path / f"{doubt}" / "run.lvm"
         path.parent.mkdir()
         path.write_bytes(lvm([Write(columns, x=t.tolist())], Style(encoding="utf-8-sig")))
         new(path)
         assert held(path.parent)["hand_roll.theta_m"] == "roll_theta_m"
+        assert held(path.parent)["hand_roll.dtheta_m"] == "roll_omega_m"
         text = (path.parent / "study.toml").read_text()
         assert text.count("a torque of the motor needs scale = <gear ratio>") == doubt
 

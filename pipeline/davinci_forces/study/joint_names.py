@@ -153,7 +153,7 @@ def _side_by_name(symbol: str, name: str) -> str:
 
 def _side(symbol: str, words: Sequence[str], unit: str, joint: Joint) -> str:
     """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    by_name = "motor" in words or ("m" in words and {"theta", "dtheta"} & {*words})
+    by_name = "motor" in words or ("m" in words and {"theta", "dtheta", "omega"} & {*words})
     return AT_MOTOR.get(symbol, symbol) if by_name or (is_angle(unit) and joint.kind is Kind.PRISMATIC) else symbol
 
 
