@@ -121,15 +121,19 @@ def contacts(
             # A short peak is flattened below the means; its error stays.
             peak = max(summary.peak, summary.mean, middle[0], key=lambda x: x * np.sign(summary.peak))
             above = clear and bool(is_above[~is_outside(track.t, [window])].any())
-            height = (summary.t_peak, peak, summary.peak_std, *middle, summary.mean, summary.mean_std)
-            rows.append((stated, event is not None, *times, *duration, *height, *impulse, above))
+            measured = (*times, *duration, summary.t_peak, peak, *summary[1:4], *middle, *impulse)
+            rows.append((stated, event is not None, above, *measured))
             if not stated and release - onset < track.smooth_rise:
                 short.append(hidden_peak(track, onset))
     if short:
         yield diagnostic("measure", f"{track.log}.{track.joint}.short", "warning", *short)
     if not rows:
         return
-    yield Contact.like(threshold, log=track.log, **dict(zip(Contact.columns(), np.array(rows).T, strict=True)))
+    names = (
+        "stated", "found", "above", "onset", "onset_std", "release", "release_std", "duration", "duration_std",
+        "t_peak", "peak", "peak_std", "mean", "mean_std", "middle_mean", "middle_mean_std", "impulse", "impulse_std",
+    )  # fmt: skip
+    yield Contact.like(threshold, log=track.log, **dict(zip(names, np.array(rows).T, strict=True)))
 
 
 def steady_effort(track: Track) -> tuple[Array, Array]:
