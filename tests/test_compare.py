@@ -55,6 +55,8 @@ def test_without_an_error_a_billionth_is_a_change(std):
     assert not changed(StatedValue(3e6, std), StatedValue(3e6 * (1 + 0.9e-9), std))
     assert changed(StatedValue(3e6, std), StatedValue(3e6 * (1 + 1.1e-9), std))
     assert changed(StatedValue(0.0, std), StatedValue(1e-300, std))
+    assert not changed(StatedValue(2.2e-318, std), StatedValue(2.7e-318, std))  # subnormal, with few digits
+    assert changed(StatedValue(2.2e-318, std), StatedValue(3e-308, std))
 
 
 def test_text_and_truth_are_compared_as_they_are_and_nan_is_nan():
@@ -123,16 +125,16 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     a, b = results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after)
     first, roll, slide, other = call("compare", a, b).split("\n\n")[:4]
     assert first.endswith(
-        "changed: 2 of verdicts, 12 of model, 1 of contacts, 2 of forces, 1 of noise, 5 of candidates"
+        "changed: 2 of accuracy, 12 of model, 1 of contacts, 1 of forces, 1 of noise, 6 of candidates"
     )
     listed = [line.strip().split("  ")[:2] for line in roll.splitlines()[2:-1]]
-    assert [row[0] for row in listed] == ["verdicts"] * 2 + ["contacts"] + ["model"] * 7
+    assert [row[0] for row in listed] == ["accuracy"] * 2 + ["contacts"] + ["model"] * 7
     assert "fit.roll.chosen.lse.p11" in roll.splitlines()[5]
-    assert roll.splitlines()[-1] == "  and 5 of model, 1 of forces, 1 of noise, 4 of candidates: --all lists them"
+    assert roll.splitlines()[-1] == "  and 5 of model, 1 of noise, 5 of candidates: --all lists them"
     every = call("compare", a, b, "--all").split("\n\n")[1].splitlines()
     assert [line.split()[1] for line in every[-6:]] == [
-        "ekf-euler.a.roll.level", "noise.a.roll.sigma", "cv.a.roll.lse.model_error",
-        *(f"fit.roll.lse.p{i}" for i in (2, 1, 0)),
+        "noise.a.roll.sigma", "cv.a.roll.lse.model_error", *(f"fit.roll.lse.p{i}" for i in (2, 1, 0)),
+        "ekf-euler.a.roll.level",
     ]  # fmt: skip
     assert "slide: 1 changed" in slide
     assert "not of one joint: 1 changed" in other
@@ -152,6 +154,23 @@ def test_values_come_before_standard_errors_and_what_repeats_another_change_come
     assert listed == [fits[0], "noise.a.roll.sigma", f"{fits[0]}.std_noise", "weight.a.roll.fit_std",
                       fits[1], f"{fits[1]}.std_noise"]  # fmt: skip
     assert "changed: 2 of model, 1 of noise, 3 of standard errors" in said
+
+
+def test_a_parameter_of_a_joint_in_a_model_of_the_arm_is_that_joint_s(tmp_path):
+    of = {"hand-roll": "hand_roll", "roll": "roll"}
+    keys = [f"fit.arm.chosen.ridge.coulomb_friction_of_{slug}" for slug in of.values()]
+    others = ["fit.arm.chosen.ridge.mass_of_hand", "predict.push_of_roll.hand-roll.chosen.r2"]
+    before = {f"threshold.{joint}.alarm_level": 1.0 for joint in of} | dict.fromkeys([*keys, *others], (1.0, 0.1))
+    before |= {f"{keys[0]}.std_noise": 1.0}
+    after = {key: value if key.startswith("threshold") else 9.0 for key, value in before.items()}
+    pair = [results(tmp_path / f"{name}.json", **numbers) for name, numbers in (("a", before), ("b", after))]
+    groups = {part.split(":")[0]: part for part in call("compare", *pair).split("\n\n")[1:-1]}
+    assert [*groups] == ["hand-roll", "roll", "arm"]
+    counts = {name: part.splitlines()[0] for name, part in groups.items()}
+    assert counts == {"hand-roll": "hand-roll: 3 changed", "roll": "roll: 1 changed", "arm": "arm: 1 changed"}
+    assert f"{keys[0]}.std_noise" in groups["hand-roll"]
+    assert keys[1] in groups["roll"]
+    assert others[0] in groups["arm"]
 
 
 def test_two_robots_are_told_apart(tmp_path):

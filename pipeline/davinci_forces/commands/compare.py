@@ -29,7 +29,7 @@ def run(
     every: Annotated[bool, Option("--all", help="List every change, not the ten largest of each joint.")] = False,
     as_json: Annotated[bool, Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")] = False,
 ) -> None:
-    """List what changed from A to B by joint: numbers of verdicts first, models not chosen last, by standard errors."""
+    """List what changed from A to B by joint: accuracy first, what is not in use last, each by standard errors."""
     from davinci_forces.runner import runs
 
     files = runs.results_of(a, reports), runs.results_of(b, reports)

@@ -1,6 +1,7 @@
 """Which numbers of two results.json differ by more than their standard errors allow."""
 
 import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,10 +12,10 @@ SUBJECTS = {  # what a key is about, by its first part; other keys are of the st
                "stability", "haptics"),
     "noise": ("noise", "whiteness", "band", "period", "log"),
 }  # fmt: skip
-OF_VERDICTS = ("model_error", "detection_level", "coverage")  # last parts of the keys that verdicts are made of
+OF_ACCURACY = ("model_error", "detection_level", "coverage")  # last parts of the keys that verdicts are made of
 OF_CANDIDATES = ("fit", "choice", "cv", "predict", "search", "guess", "identifiability", "correlation")
 RANKS = {  # to sort by
-    "verdicts": 0, "model": 1, "contacts": 1, "forces": 2, "study": 2, "noise": 3,
+    "accuracy": 0, "model": 1, "contacts": 1, "forces": 2, "study": 2, "noise": 3,
     "standard errors": 4, "candidates": 5,
 }  # fmt: skip
 SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
@@ -62,19 +63,18 @@ class Change:
 
     @property
     def subject(self) -> str:
-        """What the number is about, of RANKS; "candidates" are models and estimators that were not chosen.
+        """What the number is about, of RANKS; "candidates" are models, estimators and filters that are not in use.
 
         "standard errors" are those under keys of their own, which follow the values.
         """
         start, *others = self.key.split(".")
         is_chosen = "chosen" in others
-        if start in OF_CANDIDATES and not is_chosen:
+        if "-" in start or (start in OF_CANDIDATES and not is_chosen):  # ekf-euler is not the filter in use
             return "candidates"
-        if others[-1:] and others[-1] in OF_VERDICTS and (is_chosen or start == "effort"):
-            return "verdicts"
+        if others[-1:] and others[-1] in OF_ACCURACY and (is_chosen or start == "effort"):
+            return "accuracy"
         if others and (others[-1].startswith("std_") or others[-1].endswith("_std")):
             return "standard errors"
-        start = start.partition("-")[0]  # ekf-euler is an ekf
         return next((subject for subject, starts in SUBJECTS.items() if start in starts), "study")
 
     @property
@@ -118,12 +118,14 @@ def windows_of(numbers: Mapping[str, StatedValue]) -> dict[str, Window]:
 def by_joint(differing: Sequence[Change], keys: Iterable[str]) -> dict[str, list[Change]]:
     """Changes by the joint that their keys name, "" for none, the weightiest first; `keys` are all keys of a study.
 
-    Those that repeat the numbers of another one, as of two estimators with one result, come last.
+    `..._of_<joint>` of the arm's model is that joint's.  Repetitions, as of two estimators with one result, come last.
     """
     joints = {key.split(".")[1]: None for key in keys if key.startswith(("fit.", "threshold."))}
     groups: dict[str, list[Change]] = {}
     for change in sorted(differing, key=lambda change: change.weight, reverse=True):
-        joint = next((part for part in change.key.split(".")[1:] if part in joints), "")
+        name = change.key.partition(".std_")[0]
+        of_arm = (joint for joint in joints if name.endswith(f"_of_{joint.replace('-', '_')}"))
+        joint = next(of_arm, next((part for part in name.split(".")[1:] if part in joints), ""))
         groups.setdefault(joint, []).append(change)
     return {joint: _repetitions_last(groups[joint]) for joint in (*joints, "") if joint in groups}
 
@@ -140,7 +142,7 @@ def has_changed(a: StatedValue, b: StatedValue) -> bool:
     p, q = a.number, b.number
     if p is None or q is None:
         return type(a.value) is not type(b.value) or a.value != b.value
-    if p == q or (math.isnan(p) and math.isnan(q)):
+    if p == q or max(abs(p), abs(q)) < sys.float_info.min or (math.isnan(p) and math.isnan(q)):
         return False
     std = difference_std(a, b)
     allowed = RELATIVE * max(abs(p), abs(q)) if std is None else SIGMAS * std
