@@ -64,7 +64,7 @@ from davinci_forces.report.content import (
     name_of,
     walk,
 )
-from davinci_forces.report.content.inline import parse
+from davinci_forces.report.content.inline import literal, parse
 from davinci_forces.report.content.layout import TEXTS, number_blocks
 from davinci_forces.report.content.marks import Line, Points, VSpan
 from davinci_forces.report.context import Context, name_in_sentence, title
@@ -1172,6 +1172,23 @@ def test_a_change_of_the_baseline_has_a_true_minus_and_no_sign_without_a_standar
     unknown = Change("b", StatedValue(1.0), StatedValue(2.0))
     [table] = [b for b in baseline_section.blocks(full, {}, [known, unknown]) if isinstance(b, Table)]
     assert sorted(row[-1] for row in table.rows) == ["–", "−2.0"]
+
+
+@pytest.mark.parametrize(("number", "printed"), [(3, 3), (18, 18), (19, 10), (400, 10)])
+def test_the_weightiest_changes_of_the_baseline_are_on_paper(full: Context, number: int, printed: int):
+    """Whether or not they have standard errors; the keys are in the order of their weights."""
+    fits = [f"fit.roll.lse.p{i}" for i in range(number - 3)]
+    keys = ["effort.a.roll.coverage", "robot.condition", "noise.a.roll.sigma", *fits]
+    after = {
+        key: StatedValue(2.0 + number - i, None if key == "robot.condition" else 0.1) for i, key in enumerate(keys)
+    }
+    differences = [Change(key, replace(b, value=1.0), b) for key, b in after.items()]
+    [_, table, *folded] = baseline_section.blocks(full, {}, differences[::-1])
+    assert isinstance(table, Table)
+    assert [row[0] for row in table.rows] == [literal(key) for key in keys[:printed]]
+    assert table.caption.startswith(f"The first {printed} of {number} changes" if printed < number else f"{number} ch")
+    whole = [[row[0] for row in block.rows] for screen in folded for block in walk(screen)]
+    assert whole == [[literal(key) for key in keys[:300]]] * (printed < number)
 
 
 def test_measurements_beyond_those_on_page_one_are_counted(full: Context):

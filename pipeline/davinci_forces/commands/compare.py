@@ -1,8 +1,8 @@
 """Compare the numbers of two reports: which changed, which were added and which were removed.
 
 A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If the number has no standard
-error in either report, it has changed if the relative difference exceeds 1e-9. A number
-with another unit has changed, too. The exit code is always 0.
+error in either report, it has changed if the relative difference exceeds 1e-9, but not from one
+below 2.2e-308 to another. A number with another unit has changed, too. The exit code is always 0.
 """
 
 import json

@@ -7,9 +7,10 @@ from davinci_forces.report.changes import Change, StatedValue, changes
 from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Table, in_format, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.parts import explanation, paper_or_screen, section_of
+from davinci_forces.report.sections.parts import PAPER, explanation, paper_or_screen, section_of
 
 MAX_ROWS = 300  # of a table; `davinci-forces compare` prints all changes
+PRINTED_CHANGES = 10  # of many changes, on paper
 
 
 @section_of("Since the baseline", "baseline")
@@ -22,9 +23,7 @@ def section(context: Context) -> Iterator[Block]:
 
 def blocks(context: Context, before: Mapping[str, StatedValue], differences: Sequence[Change]) -> Iterator[Block]:
     """The section's content."""
-    changed = [c for c in differences if c.before and c.after]
-    # Those without standard error come first, and standard errors last.
-    changed.sort(key=lambda c: (c.subject == "standard errors", -abs(c.z) if c.z is not None else -math.inf))
+    changed = sorted((c for c in differences if c.before and c.after), key=lambda c: c.weight, reverse=True)
     came, went = [c.key for c in differences if not c.before], [c.key for c in differences if not c.after]
     shared = sum(key in context.results for key in before)
     yield Prose(
@@ -36,12 +35,14 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
             (literal(c.key), literal(_text(c.before)), context.number(c.key), in_format(c.z or math.nan, "+.1f"))
             for c in changed[:MAX_ROWS]
         ]
-        which = f"The {MAX_ROWS} largest of " * (len(changed) > MAX_ROWS) + count(len(changed), "change")
-        values = "values a and b, and b minus a over its standard error."
-        caption = f"{which} since the baseline, the largest first: {values}"
-        header = ("Number", "a, the baseline", "b, now", "Standard errors")
-        whole = Table(caption, header, rows, "baseline-changes", "lrrr")
-        yield from paper_or_screen(whole, "Changes since the baseline")
+        header, tables = ("Number", "a, the baseline", "b, now", "Standard errors"), []
+        for most, label in ((PRINTED_CHANGES, "baseline-first"), (MAX_ROWS, "baseline-changes")):
+            which = f"The first {most} of " * (len(changed) > most) + count(len(changed), "change")
+            caption = explanation("baseline-changes", which=which)
+            tables.append(Table(caption, header, rows[:most], label, "lrrr"))
+        if len(rows) > PAPER:
+            yield tables[0]
+        yield from paper_or_screen(tables[1], "Changes since the baseline")
     for keys, what, anchor in ((came, "new", "baseline-came"), (went, "missing", "baseline-went")):
         if keys:
             more = [f"and {len(keys) - MAX_ROWS} more"] if len(keys) > MAX_ROWS else []
