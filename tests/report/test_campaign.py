@@ -61,6 +61,20 @@ def lab(home: Path, count: int, change=lambda i, key: 0.0, dated=True) -> list[P
     return studies
 
 
+def put_in_use(home: Path, study: Path, model: str, numbers: dict[str, float]) -> None:
+    """Let the model error of the hand roll be of this model, and add numbers under keys."""
+    summary, stated = (home / "reports" / study.name / name for name in ("summary.json", "results.json"))
+    error = f"predict.check.hand_roll.{model}.model_error"
+    rows = [{"key": k, "value": x, "std": STD, "unit": "N m"} for k, x in {error: 1.0, **numbers}.items()]
+    stated.write_text(json.dumps([*json.loads(stated.read_text()), *rows]))
+    summary.write_text(summary.read_text().replace("ekf.check.hand_roll.model_error", error))
+
+
+def number_of_tests(home: Path) -> int:
+    """How many tests share the chance of a false alarm."""
+    return int(re.search(r"in all (\d+)\s+tests", page(home))[1])
+
+
 def page(home: Path) -> str:
     return (home / "reports" / "campaign.html").read_text(encoding="utf-8")
 
@@ -107,6 +121,62 @@ def test_a_study_that_stands_out_is_named_and_makes_no_drift(tmp_path):
     said = findings(tmp_path)
     assert [text for text in said if "run-11 stands out" in text and "inertia" in text]
     assert not [text for text in said if "drifts" in text]
+
+
+@pytest.mark.parametrize(
+    ("model", "fit", "suffix"),
+    [
+        ("chosen", "arm.chosen.ridge", "_of_hand_roll"),
+        ("chosen_by_log", "hand_roll.chosen.lse", ""),
+        ("independent+stribeck.ridge", "hand_roll.independent+stribeck.ridge", ""),
+    ],
+)
+def test_friction_of_the_model_in_use_is_tested_too(tmp_path, model, fit, suffix):
+    """Also where that of each joint by itself does not change; the others here are none of this joint and model."""
+    studies = lab(tmp_path, 4)
+    call("campaign", *studies)
+    before, (group, variant, estimator) = number_of_tests(tmp_path), fit.split(".")
+    assert findings(tmp_path) == []
+    names = [
+        f"{fit}.coulomb_friction_of_hand_pitch",
+        f"{fit}.coulomb_friction{suffix}.std_noise",
+        f"{fit}.inertia{suffix}",
+    ]
+    names += [f"{group}.{variant}{e}.coulomb_friction{suffix}" for e in (".consistent", f"+dahl.{estimator}")]
+    for i, study in enumerate(studies):
+        numbers = {f"fit.{fit}.{kind}_friction{suffix}": 1.0 for kind in ("coulomb", "viscous")}
+        numbers[f"fit.{fit}.coulomb_friction{suffix}"] += 0.25 * (i == 3)
+        put_in_use(tmp_path, study, model, numbers | {f"fit.{name}": 1.0 + i for name in names})
+    call("campaign", *studies)
+    [said] = findings(tmp_path)
+    assert said.startswith("Hand roll, Coulomb friction of the model in use varies by more than its standard errors")
+    trend, scatter, outliers, parameters = 1, 1, 4, 2
+    assert number_of_tests(tmp_path) == before + parameters * (trend + scatter + outliers)
+
+
+@pytest.mark.parametrize("other", ["arm.chosen.lse", "arm.chosen.ridge", "hand_roll.chosen.ridge"])
+def test_friction_of_another_model_than_the_newest_is_not_compared(tmp_path, other):
+    """Nor of the same model with another estimator, or with more friction."""
+    studies = lab(tmp_path, 5)
+    for i, study in enumerate(studies[:4]):  # the model of the last study has no friction
+        fit = other if i == 0 else "arm.chosen.ridge"
+        of = "_of_hand_roll" * fit.startswith("arm")
+        more = {f"fit.{fit}.stribeck_friction{of}": 1.0} if i == 0 and fit == "arm.chosen.ridge" else {}
+        put_in_use(tmp_path, study, "chosen", {f"fit.{fit}.coulomb_friction{of}": 9.0 if i == 0 else 1.0, **more})
+    call("campaign", *studies)
+    assert findings(tmp_path) == []
+    table = page(tmp_path).split("Hand roll: parameters, in every study")[1].partition("</table>")[0]
+    heading, *rows = re.findall(r"<tr.*?</tr>", table, re.S)
+    assert "Coulomb friction of the model in use" in heading
+    assert ["–" in row for row in rows] == [True, False, False, False, True]
+
+
+def test_least_squares_in_use_is_one_series(tmp_path):
+    studies = lab(tmp_path, 3)
+    for study in studies:
+        put_in_use(tmp_path, study, "independent.lse", {})
+    call("campaign", *studies)
+    assert "friction of the model in use" not in page(tmp_path)
 
 
 def test_joints_of_two_robots_share_nothing_but_a_name(tmp_path):
@@ -223,6 +293,7 @@ def test_a_report_says_what_a_campaign_asks(analysed, tmp_path):
     text = (tmp_path / "campaign.html").read_text()
     assert "Hand roll: parameters, in every study" in text
     assert "Detection level" in text
+    assert "Coulomb friction of the model in use" in text
     rows = {row["key"] for row in json.loads((analysed.parent.parent / "reports/arm/results.json").read_text())}
     about = json.loads((analysed.parent.parent / "reports/arm/summary.json").read_text())
     keys = [joint[name] for joint in about["joints"] for name in ("model_error", "detection_level", "coverage")]

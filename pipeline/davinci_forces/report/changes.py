@@ -1,7 +1,6 @@
 """Which numbers of two results.json differ by more than their standard errors allow."""
 
 import math
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -142,7 +141,7 @@ def has_changed(a: StatedValue, b: StatedValue) -> bool:
     p, q = a.number, b.number
     if p is None or q is None:
         return type(a.value) is not type(b.value) or a.value != b.value
-    if p == q or max(abs(p), abs(q)) < sys.float_info.min or (math.isnan(p) and math.isnan(q)):
+    if p == q or max(abs(p), abs(q)) < 2.0**-1022 or (math.isnan(p) and math.isnan(q)):  # no normal number is smaller
         return False
     std = difference_std(a, b)
     allowed = RELATIVE * max(abs(p), abs(q)) if std is None else SIGMAS * std

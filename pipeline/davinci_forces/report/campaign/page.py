@@ -72,7 +72,7 @@ def change_in_words(series: Series, findings: Findings) -> str:
 
 def where(series: Series) -> str:
     """The joint and the number."""
-    return f"{title(series.joint)}, {literal(series.name.replace('_', ' '))}"
+    return f"{title(series.joint)}, {literal(series.name.replace('_', ' ').replace('coulomb', 'Coulomb'))}"
 
 
 def date(study: CampaignStudy) -> str:
@@ -155,5 +155,5 @@ def panel(series: Series, findings: Findings) -> Panel:
     unit = format_unit(series.unit)
     name, label = series.name.replace("_", " "), "" if findings.by_date else "study"
     x_range = None if findings.by_date else (min(findings.time.values()) - 0.5, max(findings.time.values()) + 0.5)
-    heading = f"{name} [{unit}]" if unit else name
+    heading = f"{name.partition(' of the ')[0]} [{unit}]" if unit else name  # beside the title, which has it all
     return Panel(name, label, heading, tuple(marks), x_range, x_dates=findings.by_date)

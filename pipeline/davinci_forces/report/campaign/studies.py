@@ -1,5 +1,6 @@
 """The studies of a campaign, each number of a joint over all of them, and what drifts or stands out."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -11,7 +12,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Level, literal
 
-FIT = "independent.lse"  # the fit whose parameters mean the same in every study
+FIT = "independent.lse"  # the fit whose parameters mean the same in every study; the model in use may be another
 ABOUT_THE_FIT = ("mse", "r2", "condition", "samples", "periods", "hac_lags")
 FLOORS = {"model_error": "model error", "detection_level": "detection level", "coverage": "coverage of the 95 % band"}
 
@@ -50,6 +51,14 @@ class CampaignStudy:
         """Name of the study as a link to its report."""
         words = literal(self.name).replace("]", "\\]")
         return f"[{words}]({self.report})"
+
+    def friction_in_use(self, joint: str) -> dict[str, str]:
+        """Names, by key, of a joint's friction in the model that its model error is of; none if that is of FIT."""
+        error, slug = self.joints[joint].keys["model_error"] if joint in self.joints else "", joint.replace("-", "_")
+        fit = re.sub(rf".*\.{joint}\.(.*?)(_by_log)?\.model_error", r"\1", error or "")
+        # The key of a chosen model's error names no estimator: it is not that of the consistent parameters beside it.
+        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.([^.]*friction)(_of_{slug})?"
+        return {key: m[3] for key in self.numbers if fit != FIT and (m := re.fullmatch(own, key))}
 
 
 Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
@@ -91,14 +100,16 @@ def every_series(studies: Sequence[CampaignStudy]) -> Iterator[Series]:
 
 
 def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
-    """Every parameter and measure of trust of a joint over one robot's studies; other units are other series."""
+    """Parameters, friction of the model in use, and measures of trust of a joint over one robot's studies, by unit."""
     keyed: dict[tuple[str, str], list[tuple[CampaignStudy, str]]] = {}
     prefix = f"fit.{joint}.{FIT}."
+    newest = next((names for study in reversed(studies) if (names := study.friction_in_use(joint))), {})
     for study in studies:
         named = [(key.removeprefix(prefix), key) for key in study.numbers if key.startswith(prefix)]
         results = study.joints.get(joint)
         floors = [(title, results.keys.get(name)) for name, title in FLOORS.items()] if results else []
-        for name, key in [*named, *floors]:
+        in_use = newest if study.friction_in_use(joint) == newest else {}  # else another model, in other terms
+        for name, key in [*named, *((f"{name} of the model in use", key) for key, name in in_use.items()), *floors]:
             if key is not None and key in study.numbers and name not in ABOUT_THE_FIT and ".std_" not in name:
                 keyed.setdefault((name, study.numbers[key].unit), []).append((study, key))
     for (name, unit), places in keyed.items():

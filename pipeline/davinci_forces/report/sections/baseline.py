@@ -40,8 +40,7 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
             which = f"The first {most} of " * (len(changed) > most) + count(len(changed), "change")
             caption = explanation("baseline-changes", which=which)
             tables.append(Table(caption, header, rows[:most], label, "lrrr"))
-        if len(rows) > PAPER:
-            yield tables[0]
+        yield from tables[:1] if len(rows) > PAPER else ()
         yield from paper_or_screen(tables[1], "Changes since the baseline")
     for keys, what, anchor in ((came, "new", "baseline-came"), (went, "missing", "baseline-went")):
         if keys:
