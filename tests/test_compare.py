@@ -141,6 +141,7 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     said = call("compare", a, b, "--all")
     assert all(key in said for key in (*before, "tip.a.rms"))
     assert "--all" not in said
+    assert "Accuracy, of which verdicts are made, is listed first" in call("compare", "--help")
 
 
 def test_values_come_before_standard_errors_and_what_repeats_another_change_comes_last(tmp_path):

@@ -1,8 +1,8 @@
 """Compare the numbers of two reports: which changed, which were added and which were removed.
 
-A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If the number has no standard
-error in either report, it has changed if the relative difference exceeds 1e-9, but not from one
-below 2.2e-308 to another. A number with another unit has changed, too. The exit code is always 0.
+A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If neither report has a standard error, a relative
+difference above 1e-9 is a change, but not among numbers below 2.2e-308. Another unit is a change, too. Accuracy, of
+which verdicts are made, is listed first, and what is not in use last. The exit code is always 0.
 """
 
 import json
