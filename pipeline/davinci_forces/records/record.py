@@ -201,6 +201,8 @@ class Record:
 
 
 AnyRecord = TypeVar("AnyRecord", bound=Record)
+Group = TypeVar("Group")
+Member = TypeVar("Member")
 
 
 class LogRecord(Record):
@@ -251,12 +253,17 @@ class Diagnostic(Record):
     text: Labels
 
 
-def by_name(records: Iterable[AnyRecord], scalar: str) -> dict[str, list[AnyRecord]]:
-    """Group records by the value of a scalar, as by their joint, in the order in which the values first occur."""
-    groups: dict[str, list[AnyRecord]] = {}
-    for record in records:
-        groups.setdefault(getattr(record, scalar), []).append(record)
+def groups_of(pairs: Iterable[tuple[Group, Member]]) -> dict[Group, list[Member]]:
+    """The members of each group of pairs (group, member), in the order in which the groups first occur."""
+    groups: dict[Group, list[Member]] = {}
+    for group, member in pairs:
+        groups.setdefault(group, []).append(member)
     return groups
+
+
+def by_name(records: Iterable[AnyRecord], scalar: str) -> dict[str, list[AnyRecord]]:
+    """Group records by the value of a scalar, as by their joint."""
+    return groups_of((getattr(record, scalar), record) for record in records)
 
 
 def first_of_each_kind(remarks: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:

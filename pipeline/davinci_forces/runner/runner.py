@@ -9,6 +9,7 @@ from itertools import groupby
 from davinci_forces.errors import BadRequest
 from davinci_forces.files import leftovers
 from davinci_forces.records import KINDS
+from davinci_forces.records.record import groups_of
 from davinci_forces.report import REPORT
 from davinci_forces.runner import reporting
 from davinci_forces.runner.console import Console, shorten
@@ -84,10 +85,7 @@ class Runner:
         before = ""
         for stage, steps in groupby(self._steps(names), stage_of):
             tasks = [task for step in steps for task in self._tasks(step)]
-            by_reason: dict[str, list[str]] = {}
-            for task in tasks:
-                if reasons := self._reasons(task):
-                    by_reason.setdefault(_brief(reasons), []).append(task.name)
+            by_reason = groups_of((_brief(reasons), task.name) for task in tasks if (reasons := self._reasons(task)))
             yield from (f"{_listed(stage, due)}: would run: {reason}" for reason, due in by_reason.items())
             if before and not by_reason:
                 yield f"{stage}: waits for the results of {before}"
@@ -141,9 +139,7 @@ class Runner:
 
     def _run(self, graph: Graph) -> None:
         """Plan the parts that are ready and run their tasks, until all parts are done."""
-        self._before: dict[Part, list[Entry]] = {}
-        for entry in self.ledger.entries():
-            self._before.setdefault(_part(entry.stage, entry.task), []).append(entry)
+        self._before = groups_of((_part(entry.stage, entry.task), entry) for entry in self.ledger.entries())
         self._progress = {part.step: Progress() for part in graph.parts}
         for part in graph.parts:
             self._progress[part.step].unplanned += _has_tasks(part)

@@ -14,6 +14,7 @@ from typing import Any
 
 from davinci_forces.errors import NotReproduced
 from davinci_forces.files import read_bytes
+from davinci_forces.records.record import groups_of
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import ALL, reporting, runs
@@ -246,10 +247,8 @@ def compare_files(stored: Ledger, computed: Ledger) -> list[str]:
 
 def compare_numbers(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
     """Compare results by key, within the limits; raises as `recompute` does."""
-    groups: dict[str, list[str]] = {DIFFERENT: [], FAR: []}
-    for key in old | new:
-        for what in differences(key, old.get(key), new.get(key)):
-            groups.setdefault(what, []).append(key)
+    found = ((what, key) for key in old | new for what in differences(key, old.get(key), new.get(key)))
+    groups = {DIFFERENT: list[str](), FAR: list[str]()} | groups_of(found)
     examples = {what: f" ({shorten(keys, MAX_NAMES)})" if keys else "" for what, keys in groups.items()}
     counts = "; ".join(f"{len(groups[what])} {what}{names}" for what, names in examples.items())
     head = "recomputed from raw/ with another processor or packages, so compared by number and not by byte"

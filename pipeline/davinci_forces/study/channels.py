@@ -7,6 +7,7 @@ from typing import Any
 from davinci_forces.errors import BadRobot
 from davinci_forces.logs.log import Channel
 from davinci_forces.maths.units import UNITS, canonical, measures
+from davinci_forces.records.record import groups_of
 from davinci_forces.robots import Joint, Kind, Robot
 from davinci_forces.study import Source
 from davinci_forces.toml import TomlTable, excerpt
@@ -136,10 +137,7 @@ def words_of(channel: Channel) -> list[str]:
 def tissue_channels(channels: Sequence[Channel]) -> dict[str, str]:
     """Quantities by channel name, for channels of pushes into tissue; a vector counts only if it is complete."""
     numbers = [channel for channel in channels if channel.kind == "number" and not channel.derived]
-    several: dict[str, list[Channel]] = {}
-    for channel in numbers:
-        if quantity := _quantity(words_of(channel)):
-            several.setdefault(quantity, []).append(channel)
+    several = groups_of((quantity, channel) for channel in numbers if (quantity := _quantity(words_of(channel))))
     for names in (TIP, FORCE):
         if not set(names) <= set(several):
             several = {quantity: named for quantity, named in several.items() if quantity not in names}

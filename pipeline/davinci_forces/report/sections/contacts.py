@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Contact, Stiffness, Threshold, Track, Weight, by_name
+from davinci_forces.records.record import groups_of
 from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import HBand, Points
 from davinci_forces.report.context import Context, count, label, title
@@ -123,11 +124,9 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     for entry in context.study.logs:
         if entry.role not in ("contact", "weight", "tissue", "friction") or entry.name in weighed | palpated:
             continue
-        reasons: dict[str, list[str]] = {}
-        for joint in entry.joints:
-            if (entry.name, joint) not in measured:
-                why = reason(entry, tracked.get((entry.name, joint)), joint in fitted)
-                reasons.setdefault(why, []).append(title(joint))
+        joints = {joint: tracked.get((entry.name, joint)) for joint in entry.joints}
+        others = ((joint, track) for joint, track in joints.items() if (entry.name, joint) not in measured)
+        reasons = groups_of((reason(entry, track, joint in fitted), title(joint)) for joint, track in others)
         yield from ((entry.name, ", ".join(names), why) for why, names in reasons.items())
 
 

@@ -9,6 +9,7 @@ from davinci_forces.logs.joined import FILLED_IN, TimedBlock
 from davinci_forces.logs.log import Log
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.clock import fill, is_slower
+from davinci_forces.records.record import groups_of
 
 MAX_MISSING = 0.2  # of a channel's samples; with more of them missing, the log is refused
 REACH_ROWS = 1 << 10  # rows on either side that filling looks at; a longer run of missing samples is a gap
@@ -17,10 +18,8 @@ REACH_ROWS = 1 << 10  # rows on either side that filling looks at; a longer run 
 def split_by_rhythm(t: Array, block: dict[str, Array], names: Sequence[str]) -> list[tuple[str, ...]]:
     """Group channels by the rows that hold their samples; empty if none has a slower rhythm, so that samples miss."""
     slower = {name: mask for name in names if is_slower(t, mask := np.isnan(block[name]))}
-    groups: dict[bytes, list[str]] = {}
-    for name in names if slower else ():
-        groups.setdefault(slower[name].tobytes() if name in slower else b"", []).append(name)
-    return [tuple(group) for group in groups.values()]
+    rows = ((slower[name].tobytes() if name in slower else b"", name) for name in names) if slower else ()
+    return [tuple(group) for group in groups_of(rows).values()]
 
 
 def without_empty_rows(timed: Iterator[TimedBlock], names: Sequence[str]) -> Iterator[TimedBlock]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, HandLimit, Stiffness, TipContact, TipForce, Weight
-from davinci_forces.records.record import as_list
+from davinci_forces.records.record import as_list, groups_of
 from davinci_forces.report import verdicts
 from davinci_forces.report.content import Level, Number, Prose, Verdict, literal
 from davinci_forces.report.context import Context, count, name_in_sentence
@@ -30,9 +30,7 @@ def verdict_sentence(context: Context, trusts: Sequence[Trust]) -> str:
         for t in trusts
         if t.space is not None and t.level != "bad"
     ]
-    parts = (
-        [f"the smallest effort that stands out from free motion (alarm level) is {as_list(levels)}"] if levels else []
-    )
+    parts = [f"the smallest effort that stands out from free motion (alarm level) is {as_list(levels)}"] * bool(levels)
     parts += errors([trusted for trusted in trusts if trusted.level != "good" and trusted.space is not None])
     narrow = [t for t in trusts if t.narrow and t.level == "bad"]  # `levels` names the others
     unseen = [t for t in trusts if t.space is None]
@@ -150,15 +148,14 @@ def stiffnesses(context: Context) -> Iterator[str]:
 
 def currents_in_words(context: Context) -> str:
     """State by which constants motor currents became efforts; "" if none did."""
-    joints: dict[str, list[str]] = {}
-    for joint in context.study.joints_by_current:
-        factor = str(Number(joint.effort_per_ampere, joint.unit("{effort}"), digits=3))
-        joints.setdefault(factor, []).append(name_in_sentence(joint.name))
+    joints = context.study.joints_by_current
+    numbers = (str(Number(joint.effort_per_ampere, joint.unit("{effort}"), digits=3)) for joint in joints)
+    alike = groups_of(zip(numbers, (name_in_sentence(joint.name) for joint in joints), strict=True))
     factors = [
         f"{factor} on {as_list(names) if len(names) <= MAX_NAMED else f'each of {len(names)} joints'}"
-        for factor, names in joints.items()
+        for factor, names in alike.items()
     ]
-    is_listed = any(joint.name not in context.study.changed for joint in context.study.joints_by_current)
+    is_listed = any(joint.name not in context.study.changed for joint in joints)
     whose = " (by the robot’s description: check your drives)" if is_listed else ""
     tested = any(np.isfinite(weight.stated_mass) for weight in context.catalogue.records(Weight))
     untested = "" if tested else "; no known mass tests that, and all efforts scale with it"
