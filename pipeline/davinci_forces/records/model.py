@@ -1,14 +1,24 @@
 """Records of the models of joints: their parameters, the choice among them, and friction over velocity."""
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Published, Record, slug
 
 
-class Fit(Record):
+class ModelRecord(Record):
+    """A record of a model of a joint, or of the arm, by one estimator."""
+
+    KEY: ClassVar[tuple[str, ...]] = ("group", "model", "estimator")
+
+    group: str
+    model: str
+    estimator: str
+
+
+class Fit(ModelRecord):
     """The parameters of a model, estimated by one estimator from all identification logs."""
 
-    KEY = ("group", "model", "estimator")
     UNKNOWN = ("described",)
     ROWS = "parameter"
     PUBLISHED = (
@@ -17,9 +27,6 @@ class Fit(Record):
         "fit.{group}.{model}.{estimator}: mse± r2± condition samples periods hac_lags=correlated_lags",
     )
 
-    group: str
-    model: str
-    estimator: str
     structure: str
     cutoff: tuple[float, ...]  # of each effort of the model
     effort_lag: tuple[float, ...]  # likewise
@@ -61,29 +68,21 @@ class Guess(Record):
     theta: Column
 
 
-class CrossFit(Record):
+class CrossFit(ModelRecord):
     """The parameters of a model from fits that leave out some identification logs, each log once."""
 
-    KEY = ("group", "model", "estimator")
-
-    group: str
-    model: str
-    estimator: str
     left_out: Labels  # separated by ", "
     parameter: Labels
     unit: Labels
     theta: Column
 
 
-class SwarmSearch(Record):
+class SwarmSearch(ModelRecord):
     """A particle swarm search for the parameters of a model, with the lowest error after each iteration."""
 
     KEY = ("group", "model", "estimator", "walls")
     PUBLISHED = ("search.{group}.{model}.{estimator}.{walls}: mse± excess searched swarms iterations",)
 
-    group: str
-    model: str
-    estimator: str
     walls: str
     seed: int
     particles: int
