@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 from davinci_forces import __version__
@@ -121,7 +122,7 @@ class Plan:
         self.study, self.ledger = study, ledger
         self._entries = {entry.name: entry for entry in study.logs}
         self._joints = {joint.name: joint.for_units for joint in study.robot.joints}
-        self._hashes: dict[tuple[str, str], str] = {}
+        self._hash = cache(lambda what, name: hash_of(self._given(what, name)))  # many tasks share an argument
         self._places = Places(study, ledger.entries())
         self._seen = len(ledger.changes)
 
@@ -162,35 +163,26 @@ class Plan:
     def _task(
         self, asks: Declaration, name: str, records: dict[str, tuple[Located, ...]], log: str = "", joint: str = ""
     ) -> Task:
-        values = {p: self._given(what, log, joint) for p, what in asks.given.items()}
+        names = {"log": log, "entry": log, "joint": joint}
+        values = {p: self._given(what, names.get(what, "")) for p, what in asks.given.items()}
         settings = {name: getattr(self.study.settings, name) for name in asks.settings}
         inputs = {f"processed/{place}" for located in records.values() for _, place in located}
         if "log" in asks.given.values():
             inputs |= {name for file in self._entries[log].files for name in self.ledger.folders.expand(f"raw/{file}")}
-        hashes = {
-            what: self._hash(what, {"entry": log, "joint": joint}.get(what, ""), values[p])
-            for p, what in asks.given.items()
-            if what != "log"
-        }
+        hashes = {what: self._hash(what, names.get(what, "")) for what in asks.given.values() if what != "log"}
         digests = {name: self.ledger.digest(name) for name in sorted(inputs)}
         readers = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # no stage imports them
         run = code(module(stage_of(asks.name)), *RECORDS, *readers, without="davinci_forces.records")
         fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), run, __version__)
         return Task(asks.name, name, fingerprint, records, values, self._joints)
 
-    def _given(self, what: str, log: str, joint: str) -> Any:
-        """An argument of a task other than its records; for a log, its entry in study.toml."""
+    def _given(self, what: str, name: str) -> Any:
+        """An argument of a task other than its records, by the name of a joint or log; for a log, its entry."""
         if what in ("log", "entry"):
-            return self._entries[log]
+            return self._entries[name]
         if what in ("weighings", "haptics"):
             return getattr(self.study, what)
-        return self.study.robot.joint(joint) if what == "joint" else self.study.robot
-
-    def _hash(self, what: str, name: str, value: Any) -> str:
-        """The hash of an argument that many tasks share, computed once."""
-        if (what, name) not in self._hashes:
-            self._hashes[what, name] = hash_of(value)
-        return self._hashes[what, name]
+        return self.study.robot.joint(name) if what == "joint" else self.study.robot
 
 
 def log_of(asks: Declaration, task: str) -> str:

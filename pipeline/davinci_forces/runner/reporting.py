@@ -80,10 +80,9 @@ def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
     from davinci_forces.records import store
 
     def read(kind: type[Record]) -> list[Record]:
-        places = [place for name, place in located if name == kind.__name__]
-        digests = [ledger.digest(f"processed/{place}") for place in places]
-        processed, stored = ledger.folders.processed, zip(places, digests, strict=True)
-        return [store.read(kind, processed, Path(place), sha, MAX_CACHED_ROWS) for place, sha in stored]
+        stored = {place: ledger.digest(f"processed/{place}") for name, place in located if name == kind.__name__}
+        folder = ledger.folders.processed
+        return [store.read(kind, folder, Path(place), sha, MAX_CACHED_ROWS) for place, sha in stored.items()]
 
     return Catalogue(read)
 
