@@ -108,8 +108,9 @@ class Export:
     def narrow_bands(self) -> Iterator[str]:
         """Name the joints whose 95 % band is too narrow in free motion, of logs that no fit used if there are any."""
         for joint in self.joints:
-            spaces = free_spaces(self.catalogue, joint.name)
-            narrowest = min(spaces, key=lambda space: space.coverage, default=None)
+            spaces = self.catalogue.select(FreeSpace, joint=joint.name, filter=DEFAULT)
+            unfitted = [space for space in spaces if space.role != "identification"] or spaces
+            narrowest = min(unfitted, key=lambda space: space.coverage, default=None)
             if narrowest is not None and narrowest.coverage < MIN_COVERAGE:
                 covers = f"+-1.96 std covers {100 * narrowest.coverage:.0f} % of its free motion in {narrowest.log}"
                 text = f"{joint.name}: as samples arrive, {covers}, not 95 %"
@@ -233,12 +234,6 @@ def export_of(study: Study, catalogue: Catalogue, origin: ExportOrigin, names: S
         elif names:
             raise BadRequest(f"{study.name}: joint {joint.name} has no model, since no identification log moves it")
     return Export(study, catalogue, identified, tuple(joints), origin)
-
-
-def free_spaces(catalogue: Catalogue, joint: str) -> list[FreeSpace]:
-    """The free spaces of a joint by the exported filter, without those of fitted logs if there are others."""
-    spaces = catalogue.select(FreeSpace, joint=joint, filter=DEFAULT)
-    return [space for space in spaces if space.role != "identification"] or spaces
 
 
 def least_velocity(m: Motion) -> float:

@@ -65,7 +65,8 @@ def change_in_words(series: Series, findings: Findings) -> str:
     """State how a number drifts or varies."""
     name = f"**{where(series)}**"
     if line := findings.slopes.get(series.key):
-        slope = Number(line[0], f"{format_unit(series.unit)} a {findings.unit}".strip(), line[1])
+        a_time = "a day" if findings.by_date else "a study"
+        slope = Number(line[0], f"{format_unit(series.unit)} {a_time}".strip(), line[1])
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
 
@@ -139,7 +140,7 @@ def cell(study: CampaignStudy, key: str | None) -> Cell:
 
 def panel(series: Series, findings: Findings) -> Panel:
     """One number over time."""
-    t, out = findings.times(series), list(findings.stand_out(series))
+    t, out = np.array([findings.time[study.name] for study in series.studies]), list(findings.stand_out(series))
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(series.std)
     marks: list[AnyMark] = []

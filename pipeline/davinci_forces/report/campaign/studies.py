@@ -137,15 +137,6 @@ class Findings:
     tests: int = 0
     chance: float = 0.0  # that any test gives a false alarm
 
-    def times(self, one: Series) -> Array:
-        """Times of the studies of a series."""
-        return np.array([self.time[study.name] for study in one.studies])
-
-    @property
-    def unit(self) -> str:
-        """Unit of time of a slope."""
-        return "day" if self.by_date else "study"
-
     def stand_out(self, one: Series) -> tuple[int, ...]:
         """Indices of the studies of a series that stand out."""
         return self.outliers.get(one.key, ())

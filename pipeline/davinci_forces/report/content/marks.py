@@ -1,7 +1,7 @@
 """What the panels of a figure show: marks, as data.  Words in figures are shown as they are, without inline marks."""
 
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -15,17 +15,13 @@ class Mark:
     """What all marks share: columns become float arrays of one length, but for one edge more, checked when made."""
 
     def __post_init__(self) -> None:
-        columns = {f.name: _column(getattr(self, f.name)) for f in fields(self) if f.type is Array}  # type: ignore[arg-type]
+        columns = {f.name: np.asarray(getattr(self, f.name), float) for f in fields(self) if f.type is Array}  # type: ignore[arg-type]
         shapes = {name: column.shape for name, column in columns.items()}
         lengths = {column.size - (name == "edges") for name, column in columns.items()}
         if any(len(shape) != 1 for shape in shapes.values()) or len(lengths) > 1:
             raise ValueError(f"{type(self).__name__}: columns must be flat and of one length, not {shapes}")
         for name, column in columns.items():
             object.__setattr__(self, name, column)
-
-
-def _column(values: Any) -> Array:
-    return np.asarray(values, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +51,7 @@ class Points(Samples):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.y_std is not None:
-            object.__setattr__(self, "y_std", np.broadcast_to(_column(self.y_std), self.x.shape))
+            object.__setattr__(self, "y_std", np.broadcast_to(np.asarray(self.y_std, float), self.x.shape))
 
 
 @dataclass(frozen=True, eq=False)

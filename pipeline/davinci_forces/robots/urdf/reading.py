@@ -152,13 +152,9 @@ def _frames(
     indices = {name: i for i, name in enumerate([root, *(joint.child for joint in ordered)])}
     frames = list[ChainFrame]()
     for joint in ordered:
-        by, place, weight = (
-            moved[joint.name],
-            (indices[joint.parent], joint.placement, joint.axis),
-            weights[joint.child],
-        )
+        by, place = moved[joint.name], (indices[joint.parent], joint.placement, joint.axis)
         coordinate, slides = coordinates.index(by.by) if by.by else FIXED, joint.kind == "prismatic"
-        frames.append(placed_frame(joint.child, *place, coordinate, by.sign, by.bias, slides, weight))
+        frames.append(placed_frame(joint.child, *place, coordinate, by.sign, by.bias, slides, weights[joint.child]))
     return frames
 
 

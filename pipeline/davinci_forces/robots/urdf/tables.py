@@ -87,14 +87,11 @@ def parse(text: bytes, name: str) -> Element:
         open_elements[-1].inner.append(element)
         open_elements.append(element)
 
-    def end(tag: str) -> None:
-        open_elements.pop()
-
     def document_type(*_: object) -> None:
         remedy = "a URDF needs no document type; delete <!DOCTYPE ...> and what it defines"
         raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {remedy}")
 
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartElementHandler, parser.EndElementHandler = start, lambda _: open_elements.pop()
     parser.StartDoctypeDeclHandler = document_type
     try:
         parser.Parse(text, True)

@@ -80,9 +80,8 @@ def compared_with_plain(context: Context, joint: str, used: Fit, plain: Fit) -> 
     changed = [f"it adds {as_list(added)}"] if added else []
     changed += ["it couples the joint to the others"] if any(map(is_of_link, used.phi)) else []
     if used.cutoff[row] != plain.cutoff[0]:
-        changed.append(
-            f"motion and effort pass a low-pass of {used.cutoff[row]:g} Hz instead of {plain.cutoff[0]:g} Hz"
-        )
+        passes = f"motion and effort pass a low-pass of {used.cutoff[row]:g} Hz"
+        changed.append(f"{passes} instead of {plain.cutoff[0]:g} Hz")
     if used.effort_lag[row]:
         side = "after" if used.effort_lag[row] > 0 else "before"
         changed.append(f"the effort is taken {1e3 * abs(used.effort_lag[row]):g} ms {side} the motion")

@@ -38,10 +38,9 @@ def section(context: Context) -> Iterator[Block]:
     for task, failed in context.provenance.failures.items():
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {message(failed)}")
     trusts = [parts.trust(context, joint) for joint in fitted_joints(context)]
-    if trusts:
-        yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
     contacts, lines = context.catalogue.records(Contact), opening.measurements(context)
     if trusts:
+        yield Prose(f"**{opening.verdict_sentence(context, trusts)}**")
         yield Prose(opening_paragraph(context, contacts))
     if lines:
         yield Bullets(lines)
