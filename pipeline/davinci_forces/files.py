@@ -8,8 +8,10 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Callable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from io import BufferedReader, BytesIO, TextIOWrapper
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from uuid import uuid4
@@ -145,6 +147,14 @@ def visible(text: str, keep: str = "") -> str:
         return match[0] if match[0] in keep else f"\\x{code:02x}" if code < 32 else f"\\u{code:04x}"
 
     return CONTROL.sub(escape, text)
+
+
+def table(rows: Sequence[Sequence[str]], right_from: int = sys.maxsize) -> Iterator[str]:
+    """Lay out the rows of a table as lines; columns from a number on, from 0, are aligned right."""
+    widths = [max(map(len, column)) for column in zip_longest(*rows, fillvalue="")]
+    for row in rows:
+        cells = (f"{cell:{'>' if i >= right_from else '<'}{widths[i]}}" for i, cell in enumerate(row))
+        yield "  ".join(cells).rstrip()
 
 
 def json_number(value: float) -> float | None:

@@ -3,11 +3,12 @@
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
+from davinci_forces.files import table
 from davinci_forces.records import Contact, LogSummary, Stiffness
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.changes import StatedValue
@@ -92,7 +93,7 @@ def answer(context: Context) -> str:
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
     if looks:
         looks = ["look at these first:", *looks]
-    lines = [*align([HEADER, *rows]), LEGEND, *looks, *[plain(peaks)] * bool(peaks), *measured]
+    lines = [*table([HEADER, *rows]), LEGEND, *looks, *[plain(peaks)] * bool(peaks), *measured]
     return "\n".join(lines) + "\n"
 
 
@@ -100,12 +101,6 @@ def plain(text: str) -> str:
     """Remove the marks and references of a marked text."""
     spans = (span.text for span in parse(re.sub(r" See \[@[^]]*\]\.", "", text)) if span.kind != "reference")
     return "".join(spans)
-
-
-def align(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Write rows as lines, each column as wide as its longest cell."""
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def digest(context: Context) -> bytes:

@@ -5,11 +5,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import zip_longest
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import typer
 
+from davinci_forces.files import table as table
 from davinci_forces.files import visible
 
 if TYPE_CHECKING:
@@ -36,9 +37,7 @@ def console(verbosity: Verbosity) -> Console:
         if verbosity != "quiet":
             echo(line, **style)
 
-    def warn(line: str) -> None:
-        echo(line, err=True, fg="yellow")
-
+    warn = partial(echo, err=True, fg="yellow")
     return Console(say, warn, bar.show) if bar else Console(say, warn, is_verbose=verbosity == "verbose")
 
 
@@ -79,14 +78,6 @@ def echo(text: str, err: bool = False, **style: Any) -> None:
     typer.secho(text, err=err, **style)
 
 
-def table(rows: Sequence[Sequence[str]], right_from: int = sys.maxsize) -> Iterator[str]:
-    """Lay out the rows of a table as lines; columns from a number on, from 0, are aligned right."""
-    widths = [max(map(len, column)) for column in zip_longest(*rows, fillvalue="")]
-    for row in rows:
-        cells = (f"{cell:{'>' if i >= right_from else '<'}{widths[i]}}" for i, cell in enumerate(row))
-        yield "  ".join(cells).rstrip()
-
-
 def shorten(names: Sequence[str], most: int = 3) -> str:
     """The first of many names, and the number of the others."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
@@ -102,10 +93,10 @@ def show_markdown(text: str) -> None:
         """A table that is too wide breaks its words instead of cutting them."""
 
         def __rich_console__(self, *about: Any) -> Iterator[Any]:
-            for table in super().__rich_console__(*about):
-                for column in table.columns:  # type: ignore[union-attr]
+            for element in super().__rich_console__(*about):
+                for column in element.columns:  # type: ignore[union-attr]
                     column.overflow = "fold"
-                yield table
+                yield element
 
     class Whole(CodeBlock):
         """Code whose lines are not broken, as a broken comment would be code."""
