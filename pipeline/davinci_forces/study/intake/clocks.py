@@ -98,14 +98,15 @@ class UsedClocks:
             read = self._timed(self.log, self.groups[0])
             opening = next(read, None)
             rhythms = split_by_rhythm(*opening, self.groups[0].names) if opening else []
-            if not rhythms:
-                yield from self._on_one_clock(chain([opening] if opening else [], read))
-                return
-            del read, opening  # the log is read again, one clock after the other
-            groups = [replace(self.groups[0], names=names, has_empty_rows=True) for names in rhythms]
-            self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
-            if not self.are_several:
-                yield from self._on_one_clock(self._timed(self.log, self.groups[0]))
+            read = chain([opening] if opening else [], read)
+            if rhythms:
+                groups = [replace(self.groups[0], names=names, has_empty_rows=True) for names in rhythms]
+                self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
+                del opening  # the log is read again, one clock after the other
+                read = self._timed(self.log, self.groups[0])
+            if not self.are_several:  # with times where rows that are left out would spoil a count
+                for t, block in self._filled(read, self.groups[0]):
+                    yield block if self.groups[0].time else block | {ALIGNED: t}
                 return
         if not self.all_timed:
             without = next(group for group in self.groups if not self._is_known(group))
@@ -124,11 +125,6 @@ class UsedClocks:
                 self.log.remember(log.warnings, log.comments)
                 self.log.nulls, self.log.nans = self.log.nulls | log.nulls, self.log.nans | log.nans
                 self.log.dropped = max(self.log.dropped, log.dropped)
-
-    def _on_one_clock(self, timed: Iterator[TimedBlock]) -> Iterator[Block]:
-        """Yield the samples of the only clock, with times where rows that are left out would spoil a count."""
-        for t, block in self._filled(timed, self.groups[0]):
-            yield block if self.groups[0].time else block | {ALIGNED: t}
 
     def _filled(self, timed: Iterator[TimedBlock], group: ClockGroup) -> Iterator[TimedBlock]:
         """Fill short runs of missing samples, and leave out the rows of longer ones."""
