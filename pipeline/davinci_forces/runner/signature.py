@@ -78,8 +78,6 @@ def declaration(step: str) -> Declaration:
     settings, hints = _signature(step)
     declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, settings, _kinds(*get_args(hints.pop("return"))))
     for parameter, hint in hints.items():
-        if parameter in declared.settings:
-            continue
         if get_origin(hint) is Annotated:
             hint, declared.roles[parameter] = get_args(hint)
             declared.in_turn.add(parameter)
