@@ -15,8 +15,7 @@ from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Contact, FreeSpace, LogSummary, PathShare, Prediction, Stiffness
 from davinci_forces.records.forces import MIN_COVERAGE
 from davinci_forces.records.weight import SAME, TorqueConstant, Weight
-from davinci_forces.report.content import Level
-from davinci_forces.report.content.number import Number, in_format
+from davinci_forces.report.content import Level, Number, in_format
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 NO_ERROR = 0.05  # of its standard error: a smaller model error is stated as below twice its standard error

@@ -104,9 +104,8 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
         records = [_record(folders, task, place) for place in located]
         is_single = parameter in asks.each or parameter in asks.optional
         values[parameter] = next(iter(records), None) if is_single else records
-    for parameter, value in task.given.items():
-        values[parameter] = _log(folders, value) if asks.given[parameter] == "log" else value
-    return values
+    given = {p: _log(folders, value) if asks.given[p] == "log" else value for p, value in task.given.items()}
+    return values | given
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.models.terms import gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
-from davinci_forces.robots import davinci
-from davinci_forces.robots.robot import Joint
+from davinci_forces.robots import Joint, davinci
 
 ROUNDING = 1e-9  # of a number that lies half a printed digit away
 STANDARD_ERRORS = 2.0  # of a fitted parameter, within which it agrees

@@ -73,9 +73,7 @@ def with_joints_of_files(holdings: Sequence[Holding], names: Sequence[str], arms
     numbers = [int(found[1]) for name in names for found in JOINT_NUMBER.finditer(name)]
     robots, first = [arm.robot for arm in arms], 0 if 0 in numbers else 1
     untold = [i for i, holding in enumerate(holdings) if holding.joints == 1 and not holding.has_named_joints]
-    assigned = [*holdings]
-    for i in untold:
-        assigned[i] = by_file_name(holdings[i], names[i], robots, first)
+    assigned = [by_file_name(h, names[i], robots, first) if i in untold else h for i, h in enumerate(holdings)]
     named = [i for i in untold if assigned[i].has_named_joints]
     joints = {(of.robot.name if of.robot else "", frozenset(of.joints_with())) for of in (assigned[i] for i in named)}
     several = any(holding.joints > 1 for holding in assigned)

@@ -34,9 +34,7 @@ def guess(log: Log, robots: Sequence[Robot] = ()) -> Holding:
     if holding.is_complete:
         times = [c.name for c in log.channels if c.kind != "text" and not c.derived and is_time(c)]
         used = list(dict.fromkeys([*holding.meanings, *times, *([log.time] if log.time else [])]))
-        samples: dict[str, Array] = {}
-        for names in log.by_clock(used).values():
-            samples |= samples_of(log, names)
+        samples = {name: x for names in log.by_clock(used).values() for name, x in samples_of(log, names).items()}
         return with_motion(log, holding, samples)
     content = _by_content(log, [channel.name for channel in numbers if channel.name != log.time])
     if not any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):

@@ -188,10 +188,8 @@ class LogTable:
         if timing.time.isdecimal():
             yield f"time = {timing.time}  # {timing.reason}"
         big = _in_millimetres(log, touching)
-        for channel in log.channels:
+        for channel in (channel for channel in log.channels if not channel.derived and channel.kind != "text"):
             meaning = holding.meanings.get(channel.name)
-            if channel.derived or channel.kind == "text":
-                continue
             if channel.name in self.draft.sensor:
                 line = _touch_line(channel, self.draft.sensor[channel.name], in_millimetres=False)
                 sensor = "compared with the estimate; sign = -1 for a sensor of the force on the robot"

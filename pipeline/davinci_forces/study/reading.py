@@ -12,9 +12,8 @@ from davinci_forces.errors import BadLog, BadRobot, BadStudy
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.haptics import scenario as haptics
 from davinci_forces.logs import open_log
-from davinci_forces.robots import Robot, from_toml
+from davinci_forces.robots import Joint, Robot, from_toml
 from davinci_forces.robots.models import VARIANTS
-from davinci_forces.robots.robot import Joint
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Study
 from davinci_forces.study.entries import check_positive, entries_of, is_inside, lines_of_files
 from davinci_forces.study.guessing import clock_hint

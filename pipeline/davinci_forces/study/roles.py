@@ -51,9 +51,8 @@ def roles_of(recordings: Sequence[Evidence]) -> list[Role]:
     fixed = [i for i, role in enumerate(roles) if role is not None and role.role == "identification"]
     chosen = _by_motion(recordings, rest, fixed, [role is not None and role.role == "validation" for role in roles])
     reference = [recordings[i].holding for i in [*fixed, *(i for i in rest if chosen[i].role == "identification")]]
-    for i in rest:
-        if chosen[i].role != "identification" and (reason := _unlike(recordings[i].holding, reference)):
-            touched[i] = reason
+    others = [i for i in rest if chosen[i].role != "identification"]
+    touched |= {i: reason for i in others if (reason := _unlike(recordings[i].holding, reference))}
     moving = {i: {*recordings[i].holding.moving} for i, role in enumerate(roles) if role is not None or i in rest}
     for i in rest:  # what values say is a guess where another log of the joint may have that role
         has_others = any(moving[i] & joints for k, joints in moving.items() if k != i)

@@ -45,9 +45,7 @@ def choice_in_words(context: Context, choice: Choice) -> str:
 def search_tables(context: Context) -> Iterator[Block]:
     """The steps of the search for the model of each joint, up to the chosen one."""
     header = ("Step", "Low-pass / Hz", "Lag / ms", "Ridge", "Parameters", "Path blocks left out")
-    for search in context.catalogue.select(ModelSearch):
-        if not search.used:
-            continue
+    for search in (search for search in context.catalogue.records(ModelSearch) if search.used):
         columns = search.step, search.step_cutoff, search.step_lag, search.step_ridge, search.parameters, search.score
         rows = tuple(
             (literal(str(step)), f"{cutoff:g}", in_format(1e3 * lag, "g"), f"{ridge:g}", str(count), f"{score:.4f}")

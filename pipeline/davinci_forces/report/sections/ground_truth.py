@@ -8,9 +8,8 @@ import numpy as np
 
 from davinci_forces.records import TipContact, TipForce, Track
 from davinci_forces.records.record import slug
-from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, literal, message
+from davinci_forces.report.content import Block, Cell, Figure, Panel, Prose, Table, Verdict, in_format, literal, message
 from davinci_forces.report.content.marks import Line
-from davinci_forces.report.content.number import in_format
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import F, explanation, first_on_paper, of_joint, run_name, section_of
 from davinci_forces.report.verdicts import truth_level

@@ -10,9 +10,8 @@ import numpy as np
 
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.maths.arrays import Booleans, evenly, runs
-from davinci_forces.records import Column, Contact, Fit, PathShare, Prediction, Record, Residual, Track
+from davinci_forces.records import Column, Contact, Fit, PathShare, Prediction, Record, Residual, Track, Whiteness
 from davinci_forces.records.weight import TorqueConstant, Weight
-from davinci_forces.records.whiteness import Whiteness
 from davinci_forces.report.content import Block, Level, OnScreen, Panel, Section, Table, literal
 from davinci_forces.report.content.marks import AnyMark, Colour, HBand, Line, Points, Reference, Stems, VSpan
 from davinci_forces.report.context import Context, label, title

@@ -48,12 +48,9 @@ def chain(context: Context) -> Figure3D:
     configurations: dict[str, tuple[str, Colour]] = {
         "zero": ("q = 0", "black"), "low": ("lower limits", "blue"), "high": ("upper limits", "vermillion"),
     }  # fmt: skip
-    marks: list[Line3D | Points3D] = []
-    for workspace in context.catalogue.records(Workspace):
-        marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
-    for pose in context.catalogue.records(Pose):
-        x, y, z = links_in_space(pose).T
-        marks.append(Line3D(x, y, z, *configurations[pose.pose]))
+    places = (Points3D(w.x, w.y, w.z, "places of the tip", "sky") for w in context.catalogue.records(Workspace))
+    poses = ((links_in_space(pose).T, configurations[pose.pose]) for pose in context.catalogue.records(Pose))
+    marks: tuple[Line3D | Points3D, ...] = (*places, *(Line3D(x, y, z, *looks) for (x, y, z), looks in poses))
     caption = "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between."
     alt = "The robot's links as lines in space at three configurations, and the cloud of places of its tip."
-    return Figure3D(caption, alt, tuple(marks), height=110)
+    return Figure3D(caption, alt, marks, height=110)

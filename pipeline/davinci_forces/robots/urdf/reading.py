@@ -133,9 +133,7 @@ def _outwards(root: str, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
 def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]:
     """The independent joints from the base outwards, each with its name in logs and records."""
     called = dict[str, str]()
-    for joint in ordered:
-        if joint.kind == "fixed" or joint.mimic:
-            continue
+    for joint in (joint for joint in ordered if joint.kind != "fixed" and not joint.mimic):
         name = re.sub(r"[^a-z0-9_-]", "_", joint.name.lower())
         if wrong := wrong_name(name):
             file.note(joint.line, f"<joint name={joint.name!r}>: {wrong}")

@@ -154,9 +154,7 @@ def looks_at_parameters(context: Context, joint: str) -> Iterator[tuple[float, s
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
     """Yield a caveat where the detection level hides the effort sought."""
     space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
-    if space is None:
-        return
-    if trusted.sought and trusted.fineness > verdicts.DETECTED:
+    if space is not None and trusted.fineness > verdicts.DETECTED:
         level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
         hides = "hides efforts of" if trusted.fineness > verdicts.DETECTABLE else "is more than a third of"
         text = f"the detection level of {level} {hides} {sought}, which the study seeks."

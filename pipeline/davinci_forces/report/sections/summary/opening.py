@@ -112,10 +112,9 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         )
     robot = context.study.robot
     if robot.chain is not None and not context.catalogue.records(TipForce):
-        in_amperes = any(joint.effort for joint in robot.joints)
         if len(robot.joints) != TIP_JOINTS:
             yield f"No force at the tip: that takes an arm of {TIP_JOINTS} joints, and this one has {len(robot.joints)}"
-        elif in_amperes:
+        elif any(joint.effort for joint in robot.joints):  # in A
             yield "No force at the tip: that takes the torque constants of all joints"
 
 
