@@ -98,12 +98,11 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
     asks = declaration(task.step)
     values: dict[str, Any] = dict(task.fingerprint.settings)
     for parameter, located in task.records.items():
-        if parameter in asks.in_turn:
-            values[parameter] = InTurn(folders, task, located)
-            continue
-        records = [_record(folders, task, place) for place in located]
-        is_single = parameter in asks.each or parameter in asks.optional
-        values[parameter] = next(iter(records), None) if is_single else records
+        records = InTurn(folders, task, located)
+        if parameter in asks.each or parameter in asks.optional:
+            values[parameter] = next(iter(records), None)
+        else:
+            values[parameter] = records if parameter in asks.in_turn else list(records)
     given = {p: _log(folders, value) if asks.given[p] == "log" else value for p, value in task.given.items()}
     return values | given
 
