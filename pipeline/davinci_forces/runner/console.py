@@ -44,8 +44,7 @@ def console(verbosity: Verbosity) -> Console:
 class Bar:
     """Progress bar of a stage on the last line of a terminal, removed when the stage is done."""
 
-    def __init__(self) -> None:
-        self._progress: Progress | None = None
+    _progress: "Progress | None" = None
 
     def show(self, stage: str, done: int, total: int) -> None:
         """Draw the bar of a stage, and remove it with its last task."""

@@ -5,7 +5,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from davinci_forces.report.content import Document, Equation, Figure, Figure3D, walk
 from davinci_forces.report.content.inline import Span, parse, printable
@@ -83,7 +83,9 @@ def _fill(page: Json, names: list[str]) -> str:
 
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, finalize=_finalize,
+        lstrip_blocks=True,
+        # Text that is not HTML yet is shown without characters that no page can hold.
+        finalize=lambda value: value if not isinstance(value, str) or hasattr(value, "__html__") else printable(value),
     )  # fmt: skip
     environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup}
     # A data URL as the value of an attribute: it has no quotation mark, and `<` needs no escape.
@@ -92,11 +94,6 @@ def _fill(page: Json, names: list[str]) -> str:
     # The hashes by which the content security policy allows the scripts to run.
     hashes = [f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}" for text in page["scripts"]]
     return environment.get_template("report.html").render(page, numbers=numbers, hashes=hashes)
-
-
-def _finalize(value: Any) -> Any:
-    """Text that is not HTML yet, without characters that no page can hold."""
-    return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
 def _inline(page: Json) -> Callable[[str], "Markup"]:

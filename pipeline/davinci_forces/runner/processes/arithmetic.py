@@ -7,6 +7,7 @@ numpy is loaded.
 import os
 import platform
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -15,9 +16,14 @@ KERNELS = "Haswell"  # kernels of OpenBLAS for every processor of the last ten y
 KERNEL_FEATURES = {"avx2", "fma"}  # processor features that these kernels need
 
 
+@cache
 def blas_variables() -> dict[str, str]:
     """Environment variables with which numpy has to be loaded on this machine, and in workers of a cluster."""
-    kernels = {"OPENBLAS_CORETYPE": KERNELS} if _features() >= KERNEL_FEATURES else {}
+    lines: list[str] = []
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    features = {word for line in lines if line.startswith("flags") for word in line.split()}
+    kernels = {"OPENBLAS_CORETYPE": KERNELS} if features >= KERNEL_FEATURES else {}
     return dict.fromkeys(THREADS, "1") | kernels
 
 
@@ -51,12 +57,3 @@ def instructions() -> str:
 
 
 _loaded_unpinned = False  # numpy was loaded before `pin` was called, without these variables
-
-
-@cache
-def _features() -> set[str]:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return set()
-    return {word for line in lines if line.startswith("flags") for word in line.split()}
