@@ -17,7 +17,6 @@ import numpy as np
 from davinci_forces.haptics.loop import FREQUENCIES, felt_share, hand_settles, is_followed
 from davinci_forces.haptics.maths import delay as delays
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, switching_limit
-from davinci_forces.haptics.maths.delay import Complex
 from davinci_forces.haptics.scenario import MAX_TICKS, Body, FullScenario
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import HandLimit
@@ -30,7 +29,7 @@ TRIED_DELAYS = 101  # additional delays, up to one period of the free hand
 # Time [s], the response of the filter at rest to the effort minus the model's, and its external effort, each (N,).
 Recording = tuple[Array, Array, Array]
 # w (N,) [rad/s], and at each w G and Z [N/m].
-LoopResponse = tuple[Array, Complex, Complex]
+LoopResponse = tuple[Array, delays.Complex, delays.Complex]
 
 
 def without_friction(scenario: FullScenario, body: Body | None = None) -> FullScenario:

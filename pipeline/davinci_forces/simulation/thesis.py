@@ -18,7 +18,6 @@ from davinci_forces.estimators.pso import MAX_ITERATIONS, PARTICLES, PATIENCE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.excitation import fourier
-from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.models.terms import gravity_cos, gravity_sin, inertia
 from davinci_forces.records.record import slug
 from davinci_forces.robots import Joint, davinci
@@ -163,10 +162,10 @@ def factors(joint: Joint, item: str) -> dict[str, Array]:
     return values
 
 
-def trajectory(joint: Joint, source: str) -> Fourier:
+def trajectory(joint: Joint, source: str) -> fourier.Fourier:
     """A published trajectory of Table 6.1."""
     period, *x = dict(joint.published)[source]
-    return Fourier.from_coefficients(np.array(x), period)
+    return fourier.Fourier.from_coefficients(np.array(x), period)
 
 
 def excitation() -> dict[str, Array]:

@@ -13,7 +13,6 @@ from davinci_forces.logs import BAG, open_log
 from davinci_forces.logs.joined import Joined
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import belonging
-from davinci_forces.study.belonging import Arm
 from davinci_forces.study.channels import force_sensor, is_tissue, tissue_channels
 from davinci_forces.study.entries import is_inside
 from davinci_forces.study.guessing import guess
@@ -30,7 +29,7 @@ class Draft(NamedTuple):
     """The text of a study.toml, its robot, whose file may have to be written, too, a row for each log, and a remark."""
 
     text: str
-    arm: Arm
+    arm: belonging.Arm
     rows: tuple[Row, ...]
     remark: str
 
@@ -70,7 +69,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         if not (is_inside(robot_name) and (folder / robot_name).exists()):
             remedy = f"copy that file into {folder}, beside study.toml, and give its name there"
             raise BadRequest(f"--robot {robot_name}: {remedy}")
-    stated = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
+    stated = [belonging.Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else []
     arms, why_not = (stated, []) if stated else belonging.candidates(folder)
     drawn: list[DraftLog] = []
     refused: dict[Path, str] = {}
@@ -147,7 +146,7 @@ def _distinct(drawn: Sequence[DraftLog]) -> Iterator[tuple[DraftLog, str]]:
         yield draft, name
 
 
-def _named_as(arm: Arm, drawn: Sequence[DraftLog]) -> list[DraftLog]:
+def _named_as(arm: belonging.Arm, drawn: Sequence[DraftLog]) -> list[DraftLog]:
     """Assign channels to the robot's joints of the same names as their labels, else in the order of the log."""
     joints = {joint.name: k for k, joint in enumerate(arm.robot.joints)}
 
@@ -159,7 +158,7 @@ def _named_as(arm: Arm, drawn: Sequence[DraftLog]) -> list[DraftLog]:
     return [replace(draft, guess=holding_of(draft.guess)) for draft in drawn]
 
 
-def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
+def _head(arm: belonging.Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     robot = arm.robot
     reason = f"; {arm.reason}" if arm.reason else ""
     yield f"title = {in_toml(folder.resolve().name)}"

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from davinci_forces import toml
 from davinci_forces.errors import BadStudy
-from davinci_forces.toml import TomlTable
 from davinci_forces.toml.lines import MAX_TABLES
 
 FILE = "review.toml"
@@ -39,7 +38,7 @@ def read(file: Path) -> tuple[Rating, ...]:
     return ratings
 
 
-def _rating(table: TomlTable) -> Rating:
+def _rating(table: toml.TomlTable) -> Rating:
     subjects = [subject for subject in SUBJECTS if subject in table]
     if len(subjects) != 1:
         table.problem('give what is rated, as either figure = "<its label>" or run = "<its log>"')
@@ -47,7 +46,7 @@ def _rating(table: TomlTable) -> Rating:
     return _content(subject, table.text(subject, "" if not subjects else None), table)
 
 
-def _content(subject: str, name: str, table: TomlTable) -> Rating:
+def _content(subject: str, name: str, table: toml.TomlTable) -> Rating:
     verdict = table.text("verdict", choices=VERDICTS)
     texts = [table.text(key, "") for key in ("comment", "reviewer", "date", "results")]
     rating = Rating(subject, name, verdict, *texts)

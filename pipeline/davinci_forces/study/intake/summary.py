@@ -7,7 +7,6 @@ import numpy as np
 from davinci_forces.files import visible
 from davinci_forces.logs.log import UNSET_START
 from davinci_forces.maths.signals import clock as clocks
-from davinci_forces.maths.signals.clock import FILLED, GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
 
@@ -55,7 +54,7 @@ def remarks(intake: Intake) -> Iterator[str]:
         if start >= duration or end <= entry.skip:
             span = f"the log, which goes from {entry.skip:g} to {duration:g} s from its first sample on"
             yield f"the {name} window {start:g} to {end:g} s lies outside {span}; correct `{name}` in study.toml"
-    if entry.until is not None and not intake.ended and duration < entry.until - GAP / clock.rate:
+    if entry.until is not None and not intake.ended and duration < entry.until - clocks.GAP / clock.rate:
         why = f"because the log ends after {duration:g} s; both count from its first sample"
         yield f"until = {entry.until:g} s leaves nothing out, {why}"
     missing = intake.clocks.missing
@@ -64,7 +63,7 @@ def remarks(intake: Intake) -> Iterator[str]:
         yield f"the file is truncated: its last {end} rows lack some channels and are left out"
     if missing.filled_rows or left_out > end:
         lacking = ", ".join(f"{name!r} {c.count}" for name, c in missing.channels.items() if c.count > c.at_end)
-        runs = f"rows with up to {1e3 * FILLED:g} ms or one sample missing"
+        runs = f"rows with up to {1e3 * clocks.FILLED:g} ms or one sample missing"
         rows = f"{missing.filled_rows} {runs} are filled by cubics, and neither fitted nor judged"
         yield f"samples are missing ({lacking}): {rows}; {left_out - end} rows are gaps"
     yield from clocks.remarks(clock, clock.rate)

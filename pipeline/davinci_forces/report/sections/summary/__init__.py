@@ -8,7 +8,6 @@ import numpy as np
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.records import Contact, Diagnostic, Stiffness, Threshold, Track
 from davinci_forces.records.record import as_list
-from davinci_forces.report import verdicts
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Panel, Prose, Table, Verdict, literal, message
 from davinci_forces.report.content.marks import Colour, HBand, Line, Points, VSpan
 from davinci_forces.report.content.number import in_format
@@ -17,7 +16,7 @@ from davinci_forces.report.results import unit_of
 from davinci_forces.report.sections import parts
 from davinci_forces.report.sections.summary import opening
 from davinci_forces.report.sections.summary.caveats import first_looks_in_order
-from davinci_forces.report.verdicts import Trust, band_in_words, error_share, percent
+from davinci_forces.report.verdicts import COVERED, Trust, band_in_words, error_share, is_small, percent
 from davinci_forces.robots.robot import Kind
 
 WIDTH_OF_A_VALUE = 0.1  # of the panel on page one; a value needs that much room
@@ -80,7 +79,7 @@ def rule_in_words(trusts: list[Trust]) -> str:
     by_error = "model error over effort"
     rule = by_level if all(stated) else f"{by_level} where that is stated, else {by_error}" if any(stated) else by_error
     text = f"The verdict follows from {rule}, by [@thresholds]."
-    least = percent(verdicts.COVERED[0])
+    least = percent(COVERED[0])
     narrow = f" “Narrow band” is good by it, but the 95 % band covers less than {least} of free-space samples."
     return text + narrow * any(trust.narrow and trust.level == "good" for trust in trusts)
 
@@ -189,7 +188,7 @@ def peaks_in_words(context: Context, contacts: list[Contact]) -> str:
 def is_doubtful(context: Context, contact: Contact) -> Booleans:
     """Whether each contact (C,) may be due to the model: it is small, or nothing should touch the arm in its log."""
     identifies = context.study.log(contact.log).role == "identification"
-    return np.asarray(verdicts.is_small(contact) | (identifies & (contact.stated == 0)))
+    return np.asarray(is_small(contact) | (identifies & (contact.stated == 0)))
 
 
 def level_or_impulse(context: Context, contact: Contact, row: int) -> str:
