@@ -21,9 +21,8 @@ def load(name: str, folder: Path) -> Robot:
     Raises BadRobot if there is no such robot or file, or the file has problems; the message lists each with its line.
     """
     if name.endswith(FILES) and not (folder / name).exists():
-        raise BadRobot(
-            f"{folder / name}: there is no such robot file; run this in the folder of the file, or give its path"
-        )
+        remedy = "run this in the folder of the file, or give its path"
+        raise BadRobot(f"{folder / name}: there is no such robot file; {remedy}")
     robot, file = read_with_problems(name, folder)
     if file:
         file.refuse(BadRobot)

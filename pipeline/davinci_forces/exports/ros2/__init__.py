@@ -35,10 +35,8 @@ def render(export: Export) -> Rendering:
         files = {name: text.replace(f"@{key}@", value) for name, text in files.items()}
     files[f"{NAME}/node.py"] = files.pop("node.py")
     for module in CORE:
-        source = text_of(read_bytes(Path(str(module.__file__))))
-        files[f"{NAME}/{module.__name__.rpartition('.')[2]}.py"] = (
-            f"{values['COMMENT']}\n{source.replace(HERE, 'from .')}"
-        )
+        source = text_of(read_bytes(Path(str(module.__file__)))).replace(HERE, "from .")
+        files[f"{NAME}/{module.__name__.rpartition('.')[2]}.py"] = f"{values['COMMENT']}\n{source}"
     place = f"$base/lib/{NAME}\n"
     files |= {
         "setup.cfg": f"{values['COMMENT']}\n[develop]\nscript_dir={place}[install]\ninstall_scripts={place}",

@@ -109,9 +109,8 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
     elif not bases:
         notes.problem("every link is the child of another, in a loop; one must be the base")
     elif len(bases) > 1:
-        notes.problem(
-            f"links {', '.join(map(repr, bases))} have no parent; one must be the base, so add joints to the others"
-        )
+        remedy = "one must be the base, so add joints to the others"
+        notes.problem(f"links {', '.join(map(repr, bases))} have no parent; {remedy}")
     elif not file.problems() and len(_outwards(bases[0], joints)) + 1 < len(links):
         notes.problem(f"some links form a loop that is not connected to the base {bases[0]!r}; cut the loop")
     return bases[0] if len(bases) == 1 else ""

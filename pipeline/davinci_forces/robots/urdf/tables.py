@@ -141,9 +141,8 @@ class Notes:
         if not value:
             self.problem(f"{subject} is missing", element)
         elif not NAME.fullmatch(value):
-            self.problem(
-                f"{subject} is {excerpt(value)}, but may have only letters, digits, spaces and _./:+-", element
-            )
+            allowed = "letters, digits, spaces and _./:+-"
+            self.problem(f"{subject} is {excerpt(value)}, but may have only {allowed}", element)
         return value
 
     def numbers(self, element: Element | None, key: str, default: Sequence[float]) -> list[float]:
@@ -160,9 +159,8 @@ class Notes:
             self.problem(f"{key} must be {how}, not {excerpt(text)}", element)
             return list(default)
         limits = element.tag == "limit"  # numbers above NO_LIMIT mean no limit
-        likely = (
-            unlikely(key, x, "force" if key == "effort" else "") for x in values if abs(x) < NO_LIMIT or not limits
-        )
+        kind = "force" if key == "effort" else ""
+        likely = (unlikely(key, x, kind) for x in values if abs(x) < NO_LIMIT or not limits)
         if wrong := next(filter(None, likely), ""):
             self.problem(f"{wrong}, not {excerpt(text)}", element)
             return list(default)

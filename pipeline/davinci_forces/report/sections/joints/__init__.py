@@ -32,7 +32,7 @@ def section(context: Context) -> Iterator[Block]:
     for joint in joints:
         content = joint_blocks(context, [fit for fit in fits if fit.group == joint])
         yield Section(title(joint), f"fit-{joint}", tuple(content))
-    if links := link_parameters(context, joints):
+    if links := tuple(link_parameters(context, joints)):
         yield Section("Links", "fit-links", links)
 
 
@@ -154,28 +154,24 @@ def parameter_row(context: Context, fit: Fit, i: int, symbol: str, suffix: str =
     return symbol, literal(name.removesuffix(suffix)), unit, *values, in_format(z, ".1f")
 
 
-def link_parameters(context: Context, joints: list[str]) -> tuple[Block, ...]:
+def link_parameters(context: Context, joints: list[str]) -> Iterator[Block]:
     """The parameters of the links of each coupled model in use, which its joints share."""
     used = {fit.key: fit for joint in joints if (fit := context.used_record(joint)) is not None}
-    tables = list[Block]()
     for fit in used.values():
         rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
         if rows:
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
-            caption = explanation(
-                "joints-links", group=fit.group, model=fit_name(fit.model, fit.estimator), joints=moved
-            )
-            header: tuple[str, ...] = ("", *PARAMETER_HEADER)
+            about = {"group": fit.group, "model": fit_name(fit.model, fit.estimator), "joints": moved}
+            caption, header = explanation("joints-links", **about), ("", *PARAMETER_HEADER)
             body = [parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1)]
             if np.isfinite(fit.described[rows]).any():
                 header, caption = (*header, "Described"), f"{caption} {explanation('joints-links-described')}"
                 described = (Number(x, digits=3).text for x in fit.described[rows].tolist())
                 body = [(*cells, text) for cells, text in zip(body, described, strict=True)]
-            tables.append(Table(caption, header, tuple(body), f"links-{fit.group}", "lll" + "r" * (len(header) - 3)))
+            yield Table(caption, header, tuple(body), f"links-{fit.group}", "lll" + "r" * (len(header) - 3))
             sums = tuple((literal(fit.parameter[i]), literal(fit.combination[i])) for i in rows if fit.combination[i])
             table = Table(explanation("joints-links-sums"), ("Parameter", "Sum"), sums, f"sums-{fit.group}", "ll")
-            tables.append(OnScreen("What the parameters of the links are sums of", f"links-sums-{fit.group}", (table,)))
-    return tuple(tables)
+            yield OnScreen("What the parameters of the links are sums of", f"links-sums-{fit.group}", (table,))
 
 
 def comparison(context: Context, fits: list[Fit]) -> Block:
