@@ -15,15 +15,7 @@ from davinci_forces.files import read_bytes, write_bytes
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation import drift
 from davinci_forces.report.campaign.page import render_campaign
-from davinci_forces.report.campaign.studies import (
-    FLOORS,
-    CampaignStudy,
-    Findings,
-    JointVerdict,
-    Place,
-    Series,
-    every_series,
-)
+from davinci_forces.report.campaign.studies import FLOORS, CampaignStudy, Findings, JointVerdict, Series, every_series
 from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
 from davinci_forces.runner.results import stated
@@ -94,24 +86,18 @@ def read_summary(file: Path) -> dict[str, Any]:
     return dict(content)
 
 
-Test = tuple[str, Place, int]  # kind of test, its series, and the number of the study in it
-
-
 def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date: bool) -> Findings:
     """Drifts, variations and outliers beyond the standard errors, in series in which every value has one."""
     time = {study.name: float(i) for i, study in enumerate(studies, 1)}
     if by_date:  # [days since 1970]
         time = {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
-    slopes: dict[Place, tuple[float, float]] = {}
-    tests: dict[Test, float] = {}
-    for row in series:
-        if len(row.value) < 2 or not (np.isfinite(row.value).all() and np.isfinite(row.std).all()):
-            continue
-        line = drift.trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
-        if line is not None:
-            slopes[row.key] = line.slope, line.std
-            tests["drift", row.key, 0] = line.p
-        tests["scatter", row.key, 0] = drift.scatter(row.value, row.std)
+    known = [row for row in series if len(row.value) > 1 and np.isfinite([row.value, row.std]).all()]
+    times = {row.key: np.array([time[study.name] for study in row.studies]) for row in known}
+    lines = {row.key: line for row in known if (line := drift.trend(times[row.key], row.value, row.std)) is not None}
+    # By kind of test, its series, and the number of the study in it.
+    tests = {("drift", key, 0): line.p for key, line in lines.items()}
+    tests |= {("scatter", row.key, 0): drift.scatter(row.value, row.std) for row in known}
+    for row in known:
         probabilities = drift.outlier_probabilities(row.value, row.std).tolist()
         tests |= {("outlier", row.key, i): p for i, p in enumerate(probabilities)}
     rejections = drift.holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
@@ -119,9 +105,10 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
     odd = {where: tuple(i for k, at, i in significant if k == "outlier" and at == where) for _, where, _ in significant}
     limits = {row.key: limit for row in series if (limit := limits_of(row, odd.get(row.key, ())))}
+    slopes = {where: (lines[where].slope, lines[where].std) for where in drifting}
     return Findings(
-        tuple(series), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd, limits,
-        IN_CONTROL, len(tests), FALSE_ALARM_PROBABILITY,
+        tuple(series), by_date, time, slopes, frozenset(varying), odd, limits, IN_CONTROL, len(tests),
+        FALSE_ALARM_PROBABILITY,
     )  # fmt: skip
 
 
