@@ -19,7 +19,8 @@ from davinci_forces import arrays
 from davinci_forces.arrays import IdentifiedArm
 from davinci_forces.errors import BadRequest, BadRobot, NotAFile
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.records import COLUMN_DTYPES, Contact, Fit, FreeSpace, JointModel, PathShare, Record, Track, store
+from davinci_forces.records import Contact, Fit, FreeSpace, JointModel, PathShare, Record, Track, store
+from davinci_forces.records.record import COLUMN_DTYPES
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.runner import runs
 from davinci_forces.study import reading

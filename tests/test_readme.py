@@ -24,7 +24,6 @@ from davinci_forces.logs import FORMATS
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.maths.units import SI, UNITS
 from davinci_forces.records import (
-    COLUMN_DTYPES,
     KINDS,
     Control,
     Excitation,
@@ -47,6 +46,7 @@ from davinci_forces.records import (
     Weight,
 )
 from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.records.record import COLUMN_DTYPES
 from davinci_forces.report.results import collect
 from davinci_forces.robots.robot import Joint
 from davinci_forces.runner import ALL

@@ -28,20 +28,7 @@ from davinci_forces.records.model import (
 )
 from davinci_forces.records.plan import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from davinci_forces.records.prediction import JointModel, PathShare, Prediction
-from davinci_forces.records.record import (
-    COLUMN_DTYPES,
-    AnyRecord,
-    Column,
-    Counts,
-    Diagnostic,
-    Labels,
-    Names,
-    Origin,
-    Record,
-    by_name,
-    diagnostic,
-    first_of_each_kind,
-)
+from davinci_forces.records.record import AnyRecord, Column, Counts, Diagnostic, Origin, Record, by_name, diagnostic
 from davinci_forces.records.recordings import (
     Average,
     LogSummary,
@@ -68,15 +55,15 @@ from davinci_forces.records.weight import FreeWeight, Load, TorqueConstant, Weig
 from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
+    "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
     "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "Explanation", "FilterNoise", "Fit",
     "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "HandLimit", "HapticMotion",
-    "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel", "Labels", "Links",
-    "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin", "PathShare",
+    "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel", "Links",
+    "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Origin", "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "Stiffness", "StreamLevel", "Streamed", "SwarmSearch", "Threshold",
     "TipBudget", "TipContact", "TipForce", "TissueModel", "TorqueConstant", "Touch", "Track", "Trajectory",
-    "Tuning", "Weight", "Whiteness", "Workspace", "by_name", "diagnostic", "first_of_each_kind",
+    "Tuning", "Weight", "Whiteness", "Workspace", "by_name", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from davinci_forces.records import AnyRecord, Record
+from davinci_forces.records.record import AnyRecord, Record
 
 
 @dataclass(frozen=True)

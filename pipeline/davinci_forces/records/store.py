@@ -21,8 +21,8 @@ import pyarrow.parquet as pq
 from davinci_forces.errors import BadRecord, MissingRecord, PipelineError
 from davinci_forces.files import digest, require_file, temporary_name
 from davinci_forces.maths.arrays import BLOCK_SAMPLES
-from davinci_forces.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.records.record import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 
 Unit = Callable[[str], str]
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.files import read_bytes
-from davinci_forces.records import COLUMN_DTYPES, Record
 from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.records.record import COLUMN_DTYPES, Record
 from davinci_forces.runner.signature import declaration
 
 PACKAGE = Path(__file__).parents[1]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.files import read_bytes, text_of
-from davinci_forces.records import first_of_each_kind
+from davinci_forces.records.record import first_of_each_kind
 from davinci_forces.report import REPORT
 from davinci_forces.runner.console import Verbosity, console, durations, echo
 from davinci_forces.runner.ledger import Folders

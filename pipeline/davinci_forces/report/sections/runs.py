@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records import Diagnostic, Explanation, Load, LogSummary, Signal, Track, first_of_each_kind
+from davinci_forces.records import Diagnostic, Explanation, Load, LogSummary, Signal, Track
 from davinci_forces.records.forces import SMOOTHER, FilterNoise, FreeSpace
-from davinci_forces.records.record import as_list
+from davinci_forces.records.record import as_list, first_of_each_kind
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, OnScreen, Panel, Prose, Table, Verdict
 from davinci_forces.report.content.inline import literal, message
 from davinci_forces.report.content.marks import AnyMark, Band, Line, VSpan
