@@ -114,8 +114,7 @@ def _format_text(answered: "Answer") -> str:
         lines += [f"all joints: objective {arm.objective:.4f}, condition {arm.condition:.1f}, {base}"]
         lines += [_spread(_totals(arm)["starts"]), f"  {effort}; {workspace}; not checked for collisions"]
         lines += _error_lines(arm.standard_errors)
-    for e in trajectories:
-        lines += _lines(e)
+    lines += [line for e in trajectories for line in _lines(e)]
     if held:
         pose = f"hold {', '.join(held)} where they are in the logs to be evaluated"
         alone = f"the model of {trajectories[0].joint.name} alone holds in that pose"

@@ -76,9 +76,7 @@ BOX = {
 
 def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
     """The links as cylinders in the frames of Table 3.1; the holder's centre is `lc5` [m] from its frame's origin."""
-    centres = np.zeros((len(CYLINDERS), 3))
-    for centre, (*_, axis, distance) in zip(centres, CYLINDERS, strict=True):
-        centre[axis] = distance
+    centres = np.array([np.where(np.arange(3) == axis, distance, 0.0) for *_, axis, distance in CYLINDERS])
     centres[HOLDER, Z] = -lc5
     inertias = [cylinder(mass, height, radius, axis) for mass, height, radius, axis, _, _ in CYLINDERS]
     # With six coordinates or fewer there is one jaw.

@@ -119,8 +119,7 @@ def place_panels(figure: Figure) -> tuple[tuple[PlacedPanel, ...], float]:
     placed, top = list[PlacedPanel](), 0.0
     for row, over, under in zip(rows, above, below, strict=True):
         top += over
-        for j, panel in enumerate(row):
-            placed.append(replace(panel, left=j * width + left, top=top, height=high))
+        placed += [replace(panel, left=j * width + left, top=top, height=high) for j, panel in enumerate(row)]
         top += high + under
     return tuple(placed), top
 

@@ -166,12 +166,10 @@ def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]
     """Every push of the logs with few pushes."""
     header = ("Push", "Stiffness", "R2", "First contact", "On the way in", "On the way out", "Energy lost", "Share")
     names = ("k_t", "r2", "onset_depth", "k_t_loading", "k_t_unloading", "lost", "lost_share")
-    for tissue in tissues:
-        prefix = f"tissue.{tissue.log}"
+    for tissue in (tissue for tissue in tissues if len(tissue) <= MAX_PUSHES_LISTED):
+        prefix, caption = f"tissue.{tissue.log}", explanation("pushes", log=literal(tissue.log))
         rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
-        if len(rows) <= MAX_PUSHES_LISTED:
-            caption = explanation("pushes", log=literal(tissue.log))
-            yield Table(caption, header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
+        yield Table(caption, header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
 
 def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Table]:
