@@ -69,8 +69,7 @@ def drift(noise: SensorNoise, rate: float, samples: int, random: np.random.Gener
     """Draw coloured noise (N,): a first-order autoregressive process, stationary from its first sample."""
     pole = np.exp(-1 / (rate * noise.correlation))
     steps = random.normal(0.0, noise.drift * np.sqrt(1 - pole**2), samples)
-    first = [pole * random.normal(0.0, noise.drift)]
-    return np.asarray(lfilter([1.0], [1.0, -pole], steps, zi=first)[0])
+    return np.asarray(lfilter([1.0], [1.0, -pole], steps, zi=[pole * random.normal(0.0, noise.drift)])[0])
 
 
 def write(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:

@@ -86,9 +86,8 @@ class Table:
         object.__setattr__(self, "rows", tuple(self.rows))
         wrong = [len(row) for row in self.rows if len(row) != len(self.header)]
         if wrong or (self.align and len(self.align) != len(self.header)):
-            raise ValueError(
-                f"table {self.caption!r}: {len(self.header)} columns, but rows of {wrong}, align {self.align!r}"
-            )
+            but = f"{len(self.header)} columns, but rows of {wrong}, align {self.align!r}"
+            raise ValueError(f"table {self.caption!r}: {but}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,10 +74,11 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     tests_scale = any(math.isfinite(other.stated_mass) for other in context.catalogue.records(Weight))
     errors = np.abs(weight.mass_alone - weight.stated_mass) / weight.mass_alone_std
     worst = literal(weight.loaded[int(np.argmax(errors))])  # the joint that alone is furthest from the stated mass
+    turned = str(weight.loaded[int(np.argmin(weight.mass_alone / weight.mass_alone_std))])  # the most clearly negative
     others = ": [@weight-table] has scales of other masses" if tests_scale else ""
     follows = {
         "side": ". The other side of its link explains the efforts better: check its position.",
-        "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned_joint(weight))} is not "
+        "sign": f". No mass is negative: the positive direction of {name_in_sentence(turned)} is not "
         f"that of the robot's chain. In study.toml {TURN_AROUND}.",
         "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
         "unstated": f". The study states no mass, so none tests the scale of the efforts{others}.",
@@ -89,11 +90,6 @@ def verdict(context: Context, weight: Weight) -> Verdict:
     }
     named = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{doubt_of_mass(weight)}"
     return Verdict(level, named + follows[why])
-
-
-def turned_joint(weight: Weight) -> str:
-    """The joint that alone shows a negative mass most clearly."""
-    return str(weight.loaded[int(np.argmin(weight.mass_alone / weight.mass_alone_std))])
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
@@ -121,9 +117,8 @@ def by_joint(context: Context, weight: Weight) -> Table:
     names = ("mass", "mass_mirrored", "false_mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
     agree, mirrored = context.probabilities(f"weight.{weight.log}", ("agreement", "agreement_mirrored"))
-    together = (
-        f" Probability of the joints' chi-square, if they agree: {agree} ({mirrored} mirrored); below 0.01 they do not."
-    )
+    chance = f"{agree} ({mirrored} mirrored); below 0.01 they do not"
+    together = f" Probability of the joints' chi-square, if they agree: {chance}."
     caption = explanation("weight-joints", log=literal(weight.log), agreement=together if len(rows) > 1 else "")
     header = ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion")
     return Table(caption, header, rows, f"weight-joints-{weight.log}", "lrrrrrr")

@@ -93,9 +93,8 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
     if robot.chain is None or robot.bodies is None:
         table.problem(f"{robot.name} has no geometry or no masses, so the whole arm cannot be simulated", "arm")
     if list(joints) != [joint.name for joint in robot.joints]:
-        table.problem(
-            f"the whole arm needs [joint.<name>] of {', '.join(j.name for j in robot.joints)}, in that order", "joint"
-        )
+        needed = ", ".join(joint.name for joint in robot.joints)
+        table.problem(f"the whole arm needs [joint.<name>] of {needed}, in that order", "joint")
     arm, n = table.table("arm"), len(robot.joints)
     tick = arm.number("tick", above=0.0)
     rotors = _list(arm, "rotor_inertia", n)

@@ -118,9 +118,8 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         if is_mostly_constant(p):
             mean = context.results[f"{p.prefix}.mean_error"].number(2)
             varying = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
-            constant = (
-                f"; {varying} without its constant part, {mean}, as of another payload or an offset of the current"
-            )
+            as_of = "as of another payload or an offset of the current"
+            constant = f"; {varying} without its constant part, {mean}, {as_of}"
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
         share = percent(trusted.share)
         share = f"{100 * trusted.share:.1f} %" if share == percent(verdicts.GOOD) else share
