@@ -45,7 +45,7 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
     changes = [series for series in findings.every if series.key in {*findings.slopes, *findings.varying}]
     messages = [change_in_words(series, findings) for series in changes]
     for series in findings.every:
-        for i in findings.stand_out(series):
+        for i in findings.outliers.get(series.key, ()):
             shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
             messages.append(f"{series.studies[i].link} stands out: **{where(series)}** is {literal(str(shown))}.")
     if messages:
@@ -140,7 +140,7 @@ def cell(study: CampaignStudy, key: str | None) -> Cell:
 
 def panel(series: Series, findings: Findings) -> Panel:
     """One number over time."""
-    t, out = np.array([findings.time[study.name] for study in series.studies]), list(findings.stand_out(series))
+    t, out = np.array([findings.time[study.name] for study in series.studies]), [*findings.outliers.get(series.key, ())]
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(series.std)
     marks: list[AnyMark] = []

@@ -136,7 +136,3 @@ class Findings:
     inside: float = 0.0  # share of further values in control that keep the limits
     tests: int = 0
     chance: float = 0.0  # that any test gives a false alarm
-
-    def stand_out(self, one: Series) -> tuple[int, ...]:
-        """Indices of the studies of a series that stand out."""
-        return self.outliers.get(one.key, ())

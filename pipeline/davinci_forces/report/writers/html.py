@@ -39,12 +39,13 @@ def render(document: Document) -> bytes:
     placed = number_blocks(document)
     figures = {item.anchor: item.block for item in flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
-    folded = on_screen(placed)
+    few = zooms.keys() & on_screen(placed)
+    drawn = {name: thin_figure(f, FOLDED_POINTS) if name in few else f for name, f in figures.items()}
     display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
     formulas, symbols = draw_formulas([*(Formula(maths, False) for maths in marked_texts(document, "maths")), *display])
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
-        "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
+        "pictures": {name: address(shrink(svg(figure))) for name, figure in drawn.items()}, "symbols": symbols,
         "looks": looks(NAMES.values()), "scripts": [
             (TEMPLATES / name).read_text(encoding="utf-8")
             for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
@@ -61,12 +62,6 @@ def render(document: Document) -> bytes:
     parts = text.split(SIGN)
     parts[1::2] = [kept.get(part, "") for part in parts[1::2]]  # those of `_fill`; still figures have no note
     return "".join(parts).encode()
-
-
-def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
-    """The data URL of a figure's picture; that of a trace on screen only has few points."""
-    is_replaced = on_screen_only and isinstance(figure, Figure) and figure.zoomable
-    return address(shrink(svg(thin_figure(figure, FOLDED_POINTS) if is_replaced else figure)))
 
 
 def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, Figure]:
