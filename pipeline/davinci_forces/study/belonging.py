@@ -16,6 +16,7 @@ from davinci_forces.logs.joined import Joined
 from davinci_forces.maths.contact.unexplained import Course
 from davinci_forces.maths.signals import columns
 from davinci_forces.maths.units import measures
+from davinci_forces.records.record import groups_of
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study.guessing import with_motion
@@ -211,10 +212,8 @@ def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int], 
 
 def group_recordings(files: Sequence[Path]) -> list[list[Path]]:
     """Group files by recording, in their order; a file stays alone if no other shares the start of its name."""
-    groups: dict[tuple[Path, str], list[Path]] = {}
-    for file in files:
-        start, signal = split_signal(file)
-        groups.setdefault((file.parent, start if signal else file.name), []).append(file)
+    starts = ((file, *split_signal(file)) for file in files)
+    groups = groups_of(((file.parent, start if signal else file.name), file) for file, start, signal in starts)
     recordings: list[list[Path]] = []
     for members in groups.values():
         symbols = {symbol_of(file.stem) for file in members}

@@ -71,9 +71,8 @@ def by_time(context: Context, contacts: list[Contact]) -> Iterator[Table]:
 
 def alarm_levels(context: Context) -> str:
     """The alarm level of each joint in words, and what its static friction adds at standstill."""
-    adds = {
-        joint: f" + {level}" for joint, level in static_frictions(context, context.catalogue.records(Track)).items()
-    }
+    frictions = static_frictions(context, context.catalogue.records(Track))
+    adds = {joint: f" + {level}" for joint, level in frictions.items()}
     joints = [threshold.joint for threshold in context.catalogue.records(Threshold)]
     levels = [context.number(f"threshold.{joint}.alarm_level", 3, std=None) for joint in joints]
     return ", ".join(f"{title(j).lower()} {level}{adds.get(j, '')}" for j, level in zip(joints, levels, strict=True))
