@@ -20,8 +20,7 @@ PRINTED = 20  # contacts of the PDF at most
 @section_of("Contacts", "contacts")
 def section(context: Context) -> Iterator[Block]:
     """All contact windows, and the recordings that were not analysed."""
-    contacts = context.catalogue.records(Contact)
-    if contacts:
+    if contacts := context.catalogue.records(Contact):
         yield Prose(explanation("contacts", levels=alarm_levels(context)))
         yield peaks(context, contacts)
         yield from by_time(context, contacts)
@@ -29,8 +28,7 @@ def section(context: Context) -> Iterator[Block]:
         logs = dict.fromkeys(contact.log for contact in contacts)
         if unknown := [literal(log) for log in logs if not context.study.log(log).has_known_free_motion]:
             yield Prose(explanation("contacts-unknown", logs=", ".join(unknown)))
-    unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
-    if unused:
+    if unused := tuple((literal(name), joint, why) for name, joint, why in not_analysed(context)):
         columns = ("Log", "Joint", "Reason, and remedy")
         yield Table("Joints of logs on which no contact was measured.", columns, unused, "not-analysed")
 

@@ -24,10 +24,8 @@ PARAMETER_HEADER = ("Parameter", "Unit", "Value", "Error from noise", "Error fro
 @section_of("Joints", "joints")
 def section(context: Context) -> Iterator[Block]:
     """One subsection per joint: the model that was used, then all fits beside it."""
-    fits = context.own_fits()
-    if not fits:
-        return
-    yield Prose(explanation("joints"))
+    if fits := context.own_fits():
+        yield Prose(explanation("joints"))
     joints = list(dict.fromkeys(fit.group for fit in fits))
     for joint in joints:
         content = joint_blocks(context, [fit for fit in fits if fit.group == joint])
