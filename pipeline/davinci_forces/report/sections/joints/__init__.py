@@ -159,14 +159,14 @@ def link_parameters(context: Context, joints: list[str]) -> Iterator[Block]:
         rows = [i for i in range(len(fit)) if is_of_link(fit.phi[i])]
         if rows:
             moved = literal(", ".join(context.efforts_of(fit)).replace("_", " "))
-            about = {"group": fit.group, "model": fit_name(fit.model, fit.estimator), "joints": moved}
-            caption, header = explanation("joints-links", **about), ("", *PARAMETER_HEADER)
+            model, header = fit_name(fit.model, fit.estimator), ["", *PARAMETER_HEADER]
+            caption = explanation("joints-links", group=fit.group, model=model, joints=moved)
             body = [parameter_row(context, fit, i, f"$beta_{n}$") for n, i in enumerate(rows, 1)]
             if np.isfinite(fit.described[rows]).any():
-                header, caption = (*header, "Described"), f"{caption} {explanation('joints-links-described')}"
+                header, caption = [*header, "Described"], f"{caption} {explanation('joints-links-described')}"
                 described = (Number(x, digits=3).text for x in fit.described[rows].tolist())
                 body = [(*cells, text) for cells, text in zip(body, described, strict=True)]
-            yield Table(caption, header, tuple(body), f"links-{fit.group}", "lll" + "r" * (len(header) - 3))
+            yield Table(caption, tuple(header), tuple(body), f"links-{fit.group}", "lll" + "r" * (len(header) - 3))
             sums = tuple((literal(fit.parameter[i]), literal(fit.combination[i])) for i in rows if fit.combination[i])
             table = Table(explanation("joints-links-sums"), ("Parameter", "Sum"), sums, f"sums-{fit.group}", "ll")
             yield OnScreen("What the parameters of the links are sums of", f"links-sums-{fit.group}", (table,))
