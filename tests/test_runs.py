@@ -16,11 +16,12 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces.cli import app
-from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.runner import ledger, reporting, runner, runs
 from davinci_forces.runner.console import console
 from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.processes import arithmetic
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import stage_of
 from davinci_forces.stages import GROUPS, STAGES
@@ -327,6 +328,41 @@ def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
     assert "fit: first run" in said
     again = call("fit", study).splitlines()[1:]
     assert again == ["fit: 5 of 5 up to date", f"{study}: nothing to do, all stages are up to date"]
+
+
+UNGUARDED = """
+import sys, numpy, davinci_forces
+print(davinci_forces.run(sys.argv[1], jobs=2))
+"""
+
+
+def test_a_script_that_loaded_numpy_first_makes_the_bytes_of_the_command_line_in_two_processes(finished, tmp_path):
+    before = contents(reports(finished))
+    (reports(finished) / "report.html").unlink()
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED)
+    unpinned = {name: value for name, value in os.environ.items() if name not in arithmetic.blas_variables()}
+    done = subprocess.run([sys.executable, script, finished], env=unpinned, capture_output=True, text=True, check=True)
+    assert done.stdout.count("report: reports/report.html was altered") == 1
+    assert done.stdout.endswith("True\n")
+    assert contents(reports(finished)) == before
+
+
+def test_a_run_in_a_new_process_raises_and_says_what_it_would_here(finished, monkeypatch, capfd):
+    monkeypatch.setattr(arithmetic, "is_pinned", lambda: False)
+    assert davinci_forces.run(finished)
+    assert "nothing to do" in capfd.readouterr().out
+    assert davinci_forces.run(finished, quiet=True)
+    assert capfd.readouterr().out == ""
+    (finished / "push.csv").write_text("no numbers")
+    assert not davinci_forces.run(finished, "ingest")
+    assert "push.csv" in capfd.readouterr().out
+    (finished / "study.toml").write_text('robot = "no such"')
+    with pytest.raises(BadStudy, match=r"study.toml:1: there is no robot 'no such'"):
+        davinci_forces.run(finished)
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    with pytest.raises(BadRequest, match="ended with code 1"):
+        davinci_forces.run(finished)
 
 
 def test_a_group_of_a_fresh_study_runs_its_stages_and_what_they_need(study):

@@ -95,6 +95,25 @@ def test_the_force_that_made_the_efforts_comes_out_at_every_instant_and_at_its_p
     assert [keys[f"tip.push.1.{name}"] for name in ("f_x", "f_y", "f_z", "peak")] == pytest.approx([3, -4, 12, 13])
 
 
+def test_the_level_of_a_held_push_is_its_mean_over_the_middle_half():
+    """Whatever noise does to single samples: of 40 pushes, mean and error of the deviations from 13 N."""
+    held = (np.abs(T - 10.0) <= 1.0)[:, None] * [3.0, -4.0, 12.0]  # in WINDOW
+    of_push, z = tracks("davinci", efforts("davinci", held)), []
+    for seed in range(40):
+        noisy = efforts("davinci", held) + noise(seed)
+        of = [replace(x, tau_ext_direct=noisy[:, i], tau_ext_smooth=noisy[:, i]) for i, x in enumerate(of_push)]
+        contact = run("davinci", of)[TipContact]
+        z.append((contact.f_middle[0] - 13.0) / contact.f_middle_std[0])
+        assert contact.f_middle_std[0] < 0.3 * contact.f_peak_std[0]  # a mean of a hundred samples
+    assert abs(np.mean(z)) < 4 / np.sqrt(len(z))
+    assert 0.6 < np.std(z) < 1.5
+    middle = PUSH[np.abs(T - 10.0) < 0.5 + 1e-9]
+    rising = [replace(x, tau_ext_direct=x.tau_ext_smooth) for x in tracks("davinci", efforts("davinci", PUSH))]
+    assert run("davinci", rising)[TipContact].f_middle[0] == pytest.approx(np.linalg.norm(middle.mean(axis=0)))
+    still = [replace(x, static_friction=1.0, standing=1.0 + 0.0 * T) for x in of_push]
+    assert run("davinci", still)[TipContact].f_middle_std[0] > run("davinci", of_push)[TipContact].f_middle_std[0]
+
+
 def test_the_stated_deviation_is_by_how_much_the_force_is_off():
     """Of noise that obeys it: the level of free space is that of the covariance, and the ellipsoid covers it."""
     made = run("davinci", tracks("davinci", efforts("davinci", PUSH) + noise(0)))

@@ -1,5 +1,6 @@
 """Estimate the contact forces of a da Vinci arm from its motor currents, offline: from raw logs to reports."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from davinci_forces.arrays import IdentifiedArm
     from davinci_forces.filters.online import Stream
     from davinci_forces.robots.robot import Robot
+    from davinci_forces.runner.console import Verbosity
 
 __all__ = ["identify", "load", "read", "results", "robot", "run", "stream"]
 __version__ = "0.2.0"  # pyproject.toml and the citation state it, too
@@ -138,8 +140,11 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
         groups = ", ".join(name for name in GROUPS if name not in ALL)
         raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(ALL)}, and the groups {groups}")
     from davinci_forces.runner import runs
+    from davinci_forces.runner.processes import afresh
 
-    return runs.run(Path(study), stages or ALL, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
+    how = afresh.run if sys.executable and (jobs > 1 or not arithmetic.is_pinned()) else runs.run
+    verbosity: Verbosity = "quiet" if quiet else "normal"
+    return how(Path(study), stages or ALL, force=force, jobs=jobs, verbosity=verbosity)
 
 
 def results(study: str | Path) -> "pd.DataFrame":

@@ -68,7 +68,10 @@ class TipForce(LogRecord):
 class TipContact(LogRecord):
     """The force at the tip in each contact of one log, at the time at which it is largest."""
 
-    PUBLISHED = ("tip.{log}.{row}: onset release f_x± f_y± f_z± peak=f_peak± sigma_1± sigma_2± sigma_3±",)
+    UNKNOWN = "f_middle", "f_middle_std"
+    PUBLISHED = (
+        "tip.{log}.{row}: onset release f_x± f_y± f_z± peak=f_peak± middle_mean=f_middle± sigma_1± sigma_2± sigma_3±",
+    )
 
     filter: str
     stated: Counts  # whether the study states the window; these come first, then other contacts of any joint
@@ -83,6 +86,8 @@ class TipContact(LogRecord):
     f_z_std: Column
     f_peak: Column
     f_peak_std: Column
+    f_middle: Column
+    f_middle_std: Column
     sigma_1: Column
     sigma_1_std: Column
     sigma_2: Column

@@ -70,10 +70,10 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
             weak = ", ".join(in_format(x[i], ".1f") for x in (contact.weak_x, contact.weak_y, contact.weak_z))
             remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
             window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s{remark}"
-            numbers = *context.numbers(prefix, (*F, "peak")), context.number(f"{prefix}.sigma_1", 2)
+            numbers = *context.numbers(prefix, (*F, "peak", "middle_mean")), context.number(f"{prefix}.sigma_1", 2)
             rows.append((literal(contact.log), window, *numbers, f"({weak})"))
-    header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Largest std", "Direction")
-    return Table(explanation("tip-contacts"), header, rows, "tip-contacts", "llrrrrrl")
+    header = ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Middle half", "Largest std", "Direction")
+    return Table(explanation("tip-contacts"), header, rows, "tip-contacts", "llrrrrrrl")
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:

@@ -5,7 +5,14 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.contact.detection import Rounding, largest_size, narrower_means, rounded_off, without_rounding
+from davinci_forces.maths.contact.detection import (
+    Rounding,
+    largest_size,
+    mean_effort,
+    narrower_means,
+    rounded_off,
+    without_rounding,
+)
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
@@ -198,7 +205,13 @@ def tip_contacts(
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
     u = f[at] / size[at, None]
-    C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, rounded_off_joints(tracks, at, onset, release))
+    free = free_smoothed_of(tracks, [*zip(onset, release, strict=True)])
+    rounding = rounded_off_joints(tracks, at, np.round((release - onset) * tracks[0].rate).astype(int), free)
+    C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, rounding)
+    middle, middle_std = np.array([
+        middle_force(force, tracks, chain, (0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b), free)
+        for a, b in zip(onset.tolist(), release.tolist(), strict=True)
+    ]).T  # fmt: skip
     x, y, z = f_peak = (f[at] + lost).T
     sigma, axes = tip_force.sigma_ellipsoid(C)
     std = np.sqrt(np.diagonal(C, axis1=1, axis2=2))
@@ -206,6 +219,7 @@ def tip_contacts(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
         t_peak=force.t[at], f_x=x, f_x_std=std[:, 0], f_y=y, f_y_std=std[:, 1], f_z=z, f_z_std=std[:, 2],
         f_peak=np.linalg.norm(f_peak, axis=0), f_peak_std=np.sqrt(np.einsum("ni,nij,nj->n", u, C, u)),
+        f_middle=middle, f_middle_std=middle_std,
         sigma_1=sigma[:, 0], sigma_1_std=sigma_std[:, 0], sigma_2=sigma[:, 1], sigma_2_std=sigma_std[:, 1],
         sigma_3=sigma[:, 2], sigma_3_std=sigma_std[:, 2], weak_x=axes[:, 0, 0], weak_y=axes[:, 0, 1],
         weak_z=axes[:, 0, 2], x=force.x[at], y=force.y[at], z=force.z[at], condition=force.condition[at],
@@ -213,10 +227,37 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def rounded_off_joints(tracks: Sequence[Track], at: Integers, onset: Array, release: Array) -> Rounding:
-    """What is rounded off each joint's effort at peaks (K,), with its errors, each (K, 3)."""
-    windows, lengths = list(zip(onset, release, strict=True)), np.round((release - onset) * tracks[0].rate).astype(int)
-    free = np.all([free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks], axis=0)
+def free_smoothed_of(tracks: Sequence[Track], windows: Sequence[tuple[float, float]]) -> Booleans:
+    """Whether all joints are outside the windows, for the smoother, at each sample (N,)."""
+    free = [free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks]
+    return np.asarray(np.all(free, axis=0))
+
+
+def middle_force(
+    force: TipForce, tracks: Sequence[Track], chain: Chain, window: tuple[float, float], free: Booleans
+) -> tuple[float, float]:
+    """The size of the mean force over the middle half of a contact, and its error along itself; no smoothing moves it.
+
+    NaN where no pose in it determines the force.
+    """
+    t = force.t
+    within = ((t >= window[0]) & (t <= window[1])) | (np.abs(t - 0.5 * sum(window)) < 0.6 / tracks[0].rate)
+    J, _ = jacobian(chain, np.stack([track.q[within] for track in tracks], axis=-1))
+    direct = np.stack([track.tau_ext_direct[within] for track in tracks], axis=-1)
+    friction = [np.asarray(x.static_friction / 3**0.5 * x.standing, np.float64) for x in tracks]
+    means = [mean_effort(x.t, x.tau_ext_direct, window, free, y) for x, y in zip(tracks, friction, strict=True)]
+    C_tau = tip_force.covariance([std for _, std in means], matrix(force.rho_12, force.rho_13, force.rho_23))
+    f, C = tip_force.from_efforts(J, direct, C_tau)
+    known = np.isfinite(f[:, 0])
+    if not known.any():
+        return np.nan, np.nan
+    mean = f[known].mean(axis=0)
+    size = float(np.linalg.norm(mean))
+    return size, float(np.sqrt(mean @ C[known].mean(axis=0) @ mean) / max(size, np.finfo(float).tiny))
+
+
+def rounded_off_joints(tracks: Sequence[Track], at: Integers, lengths: Integers, free: Booleans) -> Rounding:
+    """What is rounded off each joint's effort at peaks (K,) of contacts of `lengths` samples (K,), each (K, 3)."""
     rows = []
     for t in tracks:
         means = narrower_means(t.t, t.tau_ext_direct, free, t.smooth_rise)

@@ -1,0 +1,52 @@
+"""Run in a new process, for a program that has loaded numpy before its threads and kernels could be set.
+
+The new process has no main module, so that its workers do not run a script of the caller again.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from subprocess import PIPE, STDOUT, Popen
+from typing import Any
+
+from davinci_forces import errors
+
+FAILED, WRONG = 4, 5  # exit codes: a task failed; a PipelineError was raised, which the last line holds
+CHILD = f"""
+import json, sys
+from pathlib import Path
+from davinci_forces.errors import PipelineError
+from davinci_forces.runner.processes import arithmetic
+arithmetic.pin()
+from davinci_forces.runner import runs
+study, names, options = json.loads(sys.argv[1])
+try:
+    sys.exit(0 if runs.run(Path(study), names, **options) else {FAILED})
+except PipelineError as error:
+    print(json.dumps([type(error).__name__, str(error)]))
+    sys.exit({WRONG})
+"""
+
+
+def run(study: Path, names: Sequence[str], **options: Any) -> bool:
+    """Call `runs.run` in a new process, print what it prints, and return or raise what it does."""
+    command = [sys.executable, "-c", CHILD, json.dumps([str(study), names, options])]
+    line, environment = "", os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    with Popen(command, env=environment, stdout=PIPE, stderr=STDOUT, text=True, encoding="utf-8") as child:
+        try:
+            assert child.stdout
+            for following in child.stdout:
+                print(line, end="", flush=True)
+                line = following
+        except BaseException:  # such as an interrupt of a notebook, which does not reach the new process
+            child.terminate()
+            raise
+    if child.returncode == WRONG:
+        kind, message = json.loads(line)
+        raise getattr(errors, "BadRequest" if kind == "NotAFile" else kind)(message)
+    print(line, end="", flush=True)
+    if child.returncode not in (0, FAILED):
+        raise errors.BadRequest(f"{study}: the run ended with code {child.returncode}; its last words are above")
+    return child.returncode == 0
