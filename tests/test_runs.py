@@ -349,7 +349,7 @@ def test_a_script_that_loaded_numpy_first_makes_the_bytes_of_the_command_line_in
 
 
 def test_a_run_in_a_new_process_raises_and_says_what_it_would_here(finished, monkeypatch, capfd):
-    monkeypatch.setattr(arithmetic, "is_pinned", lambda: False)
+    monkeypatch.setattr(arithmetic, "_loaded_unpinned", True)
     assert davinci_forces.run(finished)
     assert "nothing to do" in capfd.readouterr().out
     assert davinci_forces.run(finished, quiet=True)

@@ -14,6 +14,7 @@ from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.selection import MAX_GROUPS, CrossValidation, Equations, Ridge, standard_error, sum_all
 from davinci_forces.maths.uncertainty.bootstrap import error_of_mean
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records.prediction import CHOSEN
 
 LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
@@ -148,7 +149,7 @@ def reason(
     training = [result.fit.score for result in results]
     closest = int(np.argmin(training))
     (excess, error), gain = by_more(results[closest], results[i]), training[i] - training[closest]
-    if gain > LAST_DIGIT and excess > max(LAST_DIGIT, error):
+    if gain > LAST_DIGIT and excess > max(LAST_DIGIT, NORMAL_95 * error):
         text += (
             f"; {candidates[closest].name} fits better ({training[closest]:.4f} instead of {training[i]:.4f}) and "
             f"predicts worse ({results[closest].score:.4f}, more by {excess:.4f}, with a standard error of "

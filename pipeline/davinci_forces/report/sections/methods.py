@@ -119,13 +119,14 @@ def data_in_words(context: Context, fits: Sequence[Fit]) -> Iterator[str]:
             if key in context.results:
                 periods = round(context.results[f"{key}.periods"].value)
                 used = periods * context.results[key].value if is_averaged else used
-                motion = f"{count(periods, 'period')} of {context.number(key, 4, std=None)}"
+                whole = f"{count(periods, 'period')} of {context.number(key, 4, std=None)}"
+                motion = whole if is_averaged else f"with {whole}"
             seconds += used
             rates.append(summary.rate)
             motions.setdefault(motion, []).append(summary.log)
         if rates:
             rate = " to ".join(dict.fromkeys(f"{of(rates):.4g}" for of in (min, max)))
-            each = {motion: " each" * (len(logs) > 1 and motion[0].isdigit()) for motion, logs in motions.items()}
+            each = {motion: " each" * (len(logs) > 1 and motion != "no period") for motion, logs in motions.items()}
             listed = "; ".join(f"{', '.join(sorted(logs))}: {motion}{each[motion]}" for motion, logs in motions.items())
             yield f"{data} {count(len(rates), kind)} at {rate} Hz, {seconds:.0f} s in all ({listed})"
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from davinci_forces import errors
 
-FAILED, WRONG = 4, 5  # exit codes: a task failed; a PipelineError was raised, which the last line holds
+TASK_FAILED, RAISED = 4, 5  # exit codes: a task failed; a PipelineError was raised, which the last line holds
 CHILD = f"""
 import json, sys
 from pathlib import Path
@@ -23,10 +23,10 @@ arithmetic.pin()
 from davinci_forces.runner import runs
 study, names, options = json.loads(sys.argv[1])
 try:
-    sys.exit(0 if runs.run(Path(study), names, **options) else {FAILED})
+    sys.exit(0 if runs.run(Path(study), names, **options) else {TASK_FAILED})
 except PipelineError as error:
     print(json.dumps([type(error).__name__, str(error)]))
-    sys.exit({WRONG})
+    sys.exit({RAISED})
 """
 
 
@@ -43,10 +43,10 @@ def run(study: Path, names: Sequence[str], **options: Any) -> bool:
         except BaseException:  # such as an interrupt of a notebook, which does not reach the new process
             child.terminate()
             raise
-    if child.returncode == WRONG:
+    if child.returncode == RAISED:
         kind, message = json.loads(line)
         raise getattr(errors, "BadRequest" if kind == "NotAFile" else kind)(message)
     print(line, end="", flush=True)
-    if child.returncode not in (0, FAILED):
+    if child.returncode not in (0, TASK_FAILED):
         raise errors.BadRequest(f"{study}: the run ended with code {child.returncode}; its last words are above")
     return child.returncode == 0

@@ -27,7 +27,6 @@ MAX_PEAKS = 6  # contacts of which page one states each peak
 # Of its peak: the mean of the middle half of a push that is held, and the least within the peak's error; a triangle's
 # is three quarters.
 HELD, MIN_HELD = 0.9, 0.85
-PLATEAU, LONG_PLATEAU = 0.97, 0.2  # of a contact's largest effort; of its duration: the end of a longer one has the dot
 ANSWER_HEIGHT, HEIGHT_OF_A_LINE = 58.0, 5.0  # [mm] of the figure on page one, and of a line that takes room from it
 
 
@@ -99,7 +98,7 @@ def caption(context: Context, contacts: list[Contact], panels: list[Panel]) -> s
     is_shaded = any(isinstance(mark, VSpan) and mark.colour == TOUCHED for panel in panels for mark in panel.marks)
     shaded = ", stated contact windows shaded" if is_shaded else ""
     has_dots = any(isinstance(mark, Points) for panel in panels for mark in panel.marks)
-    dots = " Dots: peaks, of a plateau where it is left, beyond the curve by what smoothing takes off them." * has_dots
+    dots = " Dots: peaks, beyond the curve by what smoothing takes off them." * has_dots
     return f"External effort of each joint{where}{shaded}. {which}{level}{dots}"
 
 
@@ -248,13 +247,8 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 def named_peaks(track: Track, contact: Contact) -> Points:
     """The peak of each contact that was found, with its value unless a larger one is close by."""
-    times, rows = [], contact.found > 0
-    for start, end, at in zip(contact.onset[rows], contact.release[rows], contact.t_peak[rows], strict=True):
-        inside = (track.t >= start) & (track.t <= end)
-        size = np.abs(track.tau_ext_smooth[inside])
-        last = track.t[inside][size >= PLATEAU * size.max()][-1]
-        times.append(last if last - at > LONG_PLATEAU * (end - start) else at)  # its value would cover a plateau
-    t, peaks, width = np.array(times), contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
+    rows = contact.found > 0
+    t, peaks, width = contact.t_peak[rows], contact.peak[rows], WIDTH_OF_A_VALUE * (track.t[-1] - track.t[0])
     largest = [(np.abs(peaks[np.abs(t - at) < width]) <= abs(p)).all() for at, p in zip(t, peaks, strict=True)]
     names = tuple(in_format(p, "+.3g") if named else "" for named, p in zip(largest, peaks, strict=True))
     return Points(t, peaks, "", "black", names=names)

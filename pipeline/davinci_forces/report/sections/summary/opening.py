@@ -96,6 +96,9 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         largest, x, y, z = context.numbers(f"tip.{contact.log}.{row + 1}", ("peak", "f_x", "f_y", "f_z"))
         of_all = f", the largest of {len(contact)}" * (len(contact) > 1)
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
+        level = f"tip.{contact.log}.detection_level"
+        is_known = np.isfinite(context.results[level].value)
+        free = f"; without contact, 99 % stay below {context.number(level, 2)}" * bool(is_known)
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
         start, end = float(contact.onset[row]), float(contact.release[row])
@@ -105,10 +108,9 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         ]  # fmt: skip
         alone = ", which an effort on one joint alone makes unlikely" * (len(touched) == 1)
         yield (
-            f"**{literal(contact.log)}**: force at the tip up to {largest} ({start:.1f} to {end:.1f} s{of_all}; in the "
-            f"base’s axes x: {x}, y: {y}, z: {z}), "
-            f"if the arm was touched at its tip alone{alone}; without contact, 99 % stay below "
-            f"{context.number(f'tip.{contact.log}.detection_level', 2)}{beside}"
+            f"**{literal(contact.log)}**: force by the arm at its tip up to {largest} "
+            f"({start:.1f} to {end:.1f} s{of_all}; in the base’s axes x: {x}, y: {y}, z: {z}), "
+            f"if the arm was touched at its tip alone{alone}{free}{beside}"
         )
     robot = context.study.robot
     if robot.chain is not None and not context.catalogue.records(TipForce):
