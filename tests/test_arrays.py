@@ -6,6 +6,7 @@ import pickle
 import re
 import shutil
 import tomllib
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from davinci_forces.errors import BadRequest, BadRobot, NotAFile
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.records import Contact, Fit, FreeSpace, JointModel, PathShare, Record, Track, store
 from davinci_forces.records.record import COLUMN_DTYPES
+from davinci_forces.report.verdicts import BEYOND
 from davinci_forces.robots.robot import UNLIMITED
 from davinci_forces.runner import runs
 from davinci_forces.study import reading
@@ -237,6 +239,32 @@ def test_a_robot_may_be_a_dict_which_is_saved(folder, identified, tmp_path):
     described["joint"][0] |= {"kind": "round", "gear_ratio": 0}
     with pytest.raises(BadRequest, match=r"gear_ratio must be(?s:.)*kind must be"):
         davinci_forces.identify(described, FIRST.t, FIRST.q, FIRST.tau, **arguments)
+
+
+def test_names_of_logs_title_and_origin_are_saved(folder, tmp_path):
+    t, q, tau, dq = ([getattr(log, name) for log in (FIRST, SECOND)] for name in ("t", "q", "tau", "dq"))
+    given = {"dq": dq, "joints": JOINT, "period": [2.0, None], "names": ["sweep", "check"]}
+    roles = ["identification", "validation"]
+    made = davinci_forces.identify(folder / "arm.toml", t, q, tau, roles=roles, **given)
+    assert {model.log for model in made.models} == {"sweep", "check"}
+    study = reading.read(made.save(tmp_path / "raw" / "named", title="Our bench", simulated=True))
+    assert (study.title, study.simulated, [log.name for log in study.logs]) == ("Our bench", True, ["sweep", "check"])
+    for wrong, text in (
+        (["a", "a"], "a name of its own"),
+        (["a", "new"], "none 'new'"),
+        (["a"], "names"),
+        (["a", "B!"], "B!"),
+    ):
+        with pytest.raises(BadRequest, match=text):
+            davinci_forces.identify(folder / "arm.toml", t, q, tau, **given | {"names": wrong})
+
+
+def test_a_prediction_of_motion_beyond_the_fitted_one_is_warned_of(identified):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)
+    with pytest.warns(UserWarning, match=f"new/{JOINT}: .* of its samples are {BEYOND}"):
+        identified.predict(PUSHED.t, PUSHED.q + 2.0, dq=PUSHED.dq)
 
 
 def test_a_constant_offset_is_subtracted_where_free_windows_are_given(identified):

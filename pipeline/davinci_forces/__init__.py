@@ -29,6 +29,7 @@ def identify(
     joints: "str | Sequence[str] | None" = None,
     settings: "Mapping[str, Any] | None" = None,
     roles: "Sequence[str] | None" = None,
+    names: "Sequence[str] | None" = None,
 ) -> "IdentifiedArm":
     """Identify the models of a robot's joints from arrays of free motion, as the stages do from a study's logs.
 
@@ -38,7 +39,7 @@ def identify(
     the robot.  `period` [s] is that of the excitation, one for all logs or one a log; without it, it is detected.
     `settings` are those of a study.  `tau` are efforts at the joints [N m or N]: multiply a motor current by gear ratio
     and torque constant first.  `roles` has "identification" or "validation" for each log: bands and levels are then
-    those of logs that no fit used.
+    those of logs that no fit used.  `names` are those of the logs, for messages and for the study that `save` writes.
 
     >>> arm = davinci_forces.identify("davinci", t, q, tau, joints="hand_roll")
     >>> arm.parameters["parameter"].tolist()[:2]
@@ -61,7 +62,8 @@ def identify(
     arithmetic.pin()
     from davinci_forces import arrays
 
-    return arrays.identify(robot, t, q, tau, period=period, dq=dq, joints=joints, settings=settings, roles=roles)
+    about = {"period": period, "dq": dq, "joints": joints, "settings": settings, "roles": roles, "names": names}
+    return arrays.identify(robot, t, q, tau, **about)
 
 
 def load(study: str | Path) -> "IdentifiedArm":

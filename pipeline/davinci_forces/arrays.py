@@ -62,7 +62,7 @@ def identify(
     robot: str | Path | Robot | Mapping[str, Any], t: Samples, q: Samples, tau: Samples, *,
     period: float | Sequence[float] | None = None, dq: Samples = None,
     joints: str | Sequence[str] | None = None, settings: Mapping[str, Any] | None = None,
-    roles: Sequence[str] | None = None,
+    roles: Sequence[str] | None = None, names: Sequence[str] | None = None,
 ) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from free motion; see `davinci_forces.identify`."""
     table = TomlTable(dict(settings or {}), TomlFile("settings", {}))
@@ -83,16 +83,19 @@ def identify(
     if not {FITTED} <= {*used_as} <= {FITTED, VALIDATION}:
         each = f"give {FITTED} or {VALIDATION} for each log"
         raise BadRequest(f"roles is {used_as}: {each}, and {FITTED} for at least one")
-    for name, x in [*given.items(), ("period", periods), ("roles", used_as)]:
+    numbers = [used_as[: i + 1].count(role) for i, role in enumerate(used_as)]
+    by_role = [f"{role}-{i}" if len(times) > 1 else role for role, i in zip(used_as, numbers, strict=True)]
+    called = by_role if names is None else list(names)
+    for name, x in [*given.items(), ("period", periods), ("roles", used_as), ("names", called)]:
         if len(x) != len(times):
             raise BadRequest(f"t has {len(times)} logs, but {name} has {len(x)}; give a list of as many for each")
+    if len({*called, NEW}) <= len(called):
+        raise BadRequest(f"names is {called}: give each log a name of its own, and none {NEW!r}")
     moved = joints_of(arm, given["q"][0], [joints] if isinstance(joints, str) else joints)
     logs = columns_of(times, given, moved)
-    numbers = [used_as[: i + 1].count(role) for i, role in enumerate(used_as)]
-    names = [f"{role}-{i}" if len(logs) > 1 else role for role, i in zip(used_as, numbers, strict=True)]
 
     def study_in(home: Path) -> Study:
-        entries = [save_log(arm, home, *log) for log in zip(names, logs, periods, used_as, strict=True)]
+        entries = [save_log(arm, home, *log) for log in zip(called, logs, periods, used_as, strict=True)]
         return Study(home, "Arrays", arm, False, used, tuple(entries))
 
     return IdentifiedArm(study_in, moved, (robot, dict(settings or {})))
@@ -203,7 +206,8 @@ def columns_of(
 class IdentifiedArm:
     """The identified models of a robot's joints, which predict efforts and estimate external efforts.
 
-    `fits` and `record` hold the Fit of each joint, with `r2` and `mse`; `parameters` is the same as a DataFrame.
+    `fits` and `record` hold the Fit of each joint, or of all coupled joints, with `r2` and `mse` of their efforts
+    together; `parameters` is the same as a DataFrame.
     `models` has the JointModel of each joint and log, `diagnostics` the remarks of the stages.  `save` makes a study of
     it, for a report, a stream or an export.
     """
@@ -238,10 +242,11 @@ class IdentifiedArm:
     def parameters(self) -> pd.DataFrame:
         """The parameters of each fit with their standard errors and units.
 
-        A parameter of coupled links is a sum that it leads: `combination`; `described` is that of the description.
+        Friction reverses or decays within its `scale`.  A parameter of coupled links is a sum that it leads:
+        `combination`; `described` is that of the description.
         """
         columns = {"theta": "value", "theta_std": "std"}
-        names = ["group", "model", "estimator", "parameter", *columns, "unit", "combination", "described"]
+        names = ["group", "model", "estimator", "parameter", *columns, "unit", "scale", "combination", "described"]
         frames = [as_frame(fit)[names] for fit in self.record]
         return pd.concat(frames, ignore_index=True).rename(columns=columns)
 
@@ -260,6 +265,8 @@ class IdentifiedArm:
         columns |= {f"{joint}.tau": np.zeros_like(columns["time"]) for joint in self.joints}
         reading = self._run(PREDICTED, self._contact_log(NEW, columns))
         models = [model for model in reading(JointModel) if model.log == NEW]
+        for text in unfitted_motion(share for share in reading(PathShare) if share.log == NEW):
+            warnings.warn(text, stacklevel=2)
         if not models:
             raise BadRequest("\n".join(["the effort of no joint is predicted", *new_texts(reading)]))
         predictions: dict[str, pd.DataFrame] = {}
@@ -299,10 +306,14 @@ class IdentifiedArm:
         labels = tuple(self._effort_label(track.joint) for track in tracks)
         return ExternalEffort(tuple(tracks), tuple(contacts), labels, texts, (columns, windows))
 
-    def save(self, folder: str | Path, **contact_logs: "ExternalEffort") -> Path:
+    def save(
+        self, folder: str | Path, *, title: str = "From arrays", simulated: bool = False,
+        **contact_logs: "ExternalEffort",
+    ) -> Path:  # fmt: skip
         """Write the identified logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` reports.
 
         The logs of external efforts are written, too, each under its name: `arm.save("raw/mine", push=effort)`.
+        Pages of a `simulated` study say so.
 
         Raises
         ------
@@ -319,7 +330,7 @@ class IdentifiedArm:
         if isinstance(robot, Robot):
             raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
         file = "robot.toml" if isinstance(robot, Mapping) else Path(robot).name
-        lines = ['title = "From arrays"', f"robot = {in_toml(file)}", "simulated = false"]
+        lines = [f"title = {in_toml(title)}", f"robot = {in_toml(file)}", f"simulated = {in_toml(simulated)}"]
         lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
         more = [self._contact_log(name, *effort._log) for name, effort in contact_logs.items()]
         logs = (*self._study.logs, *more)
@@ -387,7 +398,7 @@ class IdentifiedArm:
         if not runner.run([stage]):
             raise BadRequest("\n".join(lines))
         for line in lines if stage != PREDICTED else ():  # a prediction is given no effort, which is no fault
-            warnings.warn(line, stacklevel=4)
+            warnings.warn(line.replace("warning: ", "", 1), stacklevel=4)
 
         def read(kind: type[AnyRecord]) -> list[AnyRecord]:
             places = runner.plan.places().find((kind,))
@@ -480,14 +491,20 @@ def new_texts(reading: Any) -> tuple[str, ...]:
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
 
 
-def doubts(reading: Any) -> list[str]:
-    """What page one of a report would doubt: motion beyond the fitted one, and bands that are too narrow."""
+def unfitted_motion(shares: Iterable[PathShare]) -> list[str]:
+    """What page one of a report would doubt of the motion in logs: that it is beyond the fitted one."""
     texts = []
-    for x in (share for share in reading(PathShare) if share.role != FITTED):
+    for x in shares:
         if x.speed_ratio > MAX_SPEED_RATIO:
             texts.append(f"{x.log}/{x.joint}: it moves {x.speed_ratio:.2g} times as fast as in any fitted log")
         if x.outside > MAX_OUTSIDE:
             texts.append(f"{x.log}/{x.joint}: {percent(x.outside)} of its samples are {BEYOND}")
+    return texts
+
+
+def doubts(reading: Any) -> list[str]:
+    """What page one of a report would doubt: motion beyond the fitted one, and bands that are too narrow."""
+    texts = unfitted_motion(share for share in reading(PathShare) if share.role != FITTED)
     spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
     return texts + [
