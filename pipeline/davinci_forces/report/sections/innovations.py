@@ -50,7 +50,7 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
         for e in explained
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
-    within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
+    within = f" White innovations are within {band:.2g} of 1 in 95 of 100 runs." if band else ""
     caption = parts.explanation("innovation-verdicts", within=within, most=PRINTED_RUNS)
     header = ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict")
     order = sorted(range(len(rows)), key=lambda i: least_probability(explained[i])[0])
