@@ -12,6 +12,7 @@ from subprocess import PIPE, STDOUT, Popen
 from typing import Any
 
 from davinci_forces import errors
+from davinci_forces.runner.console import echo
 
 TASK_FAILED, RAISED = 4, 5  # exit codes: a task failed; a PipelineError was raised, which the last line holds
 CHILD = f"""
@@ -38,7 +39,7 @@ def run(study: Path, names: Sequence[str], **options: Any) -> bool:
         try:
             assert child.stdout
             for following in child.stdout:
-                print(line, end="", flush=True)
+                echo(line, nl=False)
                 line = following
         except BaseException:  # such as an interrupt of a notebook, which does not reach the new process
             child.terminate()
@@ -46,7 +47,7 @@ def run(study: Path, names: Sequence[str], **options: Any) -> bool:
     if child.returncode == RAISED:
         kind, message = json.loads(line)
         raise getattr(errors, "BadRequest" if kind == "NotAFile" else kind)(message)
-    print(line, end="", flush=True)
+    echo(line, nl=False)
     if child.returncode not in (0, TASK_FAILED):
         raise errors.BadRequest(f"{study}: the run ended with code {child.returncode}; its last words are above")
     return child.returncode == 0
