@@ -26,7 +26,7 @@ study, names, options = json.loads(sys.argv[1])
 try:
     sys.exit(0 if runs.run(Path(study), names, **options) else {TASK_FAILED})
 except PipelineError as error:
-    print(json.dumps([type(error).__name__, str(error)]))
+    sys.stdout.write(json.dumps([type(error).__name__, str(error)]))
     sys.exit({RAISED})
 """
 
