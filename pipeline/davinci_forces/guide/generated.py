@@ -36,13 +36,14 @@ def python() -> str:
     """Every public name of the package, with its signature and docstring."""
     import davinci_forces
     from davinci_forces import arrays
+    from davinci_forces.arrays.effort import ExternalEffort
     from davinci_forces.filters.online import OnlineEffort, Stream
     from davinci_forces.robots.robot import Robot
 
     blocks: list[str] = []
     for name in davinci_forces.__all__:
         blocks += document_function(f"davinci_forces.{name}", getattr(davinci_forces, name))
-    for kind in (arrays.IdentifiedArm, arrays.ExternalEffort, Stream, OnlineEffort, Robot):
+    for kind in (arrays.IdentifiedArm, ExternalEffort, Stream, OnlineEffort, Robot):
         blocks += [f"## {kind.__name__}", inspect.getdoc(kind) or ""]
         public = {
             name: member for name, member in vars(kind).items() if not name.startswith("_") and inspect.getdoc(member)

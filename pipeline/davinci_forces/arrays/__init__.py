@@ -6,8 +6,7 @@ import tempfile
 import warnings
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from html import escape
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,12 @@ import numpy as np
 import pandas as pd
 
 from davinci_forces import robots
+from davinci_forces.arrays.effort import ExternalEffort, as_html, axes_of
+from davinci_forces.arrays.given import Columns, Samples, Windows, columns_of, joints_of, windows_of
 from davinci_forces.errors import BadRequest
 from davinci_forces.files import read_bytes, write_folder
 from davinci_forces.filters.error_bands import total_variance
 from davinci_forces.identification.joint_models import Identified
-from davinci_forces.maths.arrays import Array
 from davinci_forces.records import (
     AnyRecord,
     Choice,
@@ -35,7 +35,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
-from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, is_small, percent
+from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, percent
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.runner import runs
@@ -51,11 +51,6 @@ from davinci_forces.toml import TomlFile, TomlTable, in_toml
 IDENTIFIED, PREDICTED, MEASURED = "calibrate", "predict", "measure"  # the last stage of each request
 NEW = "new"  # the log that is predicted, or whose external effort is estimated
 FITTED, VALIDATION = "identification", "validation"
-MIN_SAMPLES = 50  # of a log
-
-Samples = Any  # an array, Series or DataFrame, or a list of those, one a log
-Windows = Sequence[Sequence[float]]  # [[start, end], ...] [s]
-Columns = dict[str, Array]  # the channels of a log by name: `time`, `hand_roll.q`, ...
 
 
 def identify(
@@ -138,69 +133,6 @@ def refuse(table: TomlTable) -> None:
     """Raise the problems of a table, one a line, without the lines of a file, as there is none."""
     if table.file.noted:
         raise BadRequest("\n".join(text for _, text in sorted(table.file.noted)))
-
-
-def joints_of(robot: Robot, q: Samples, joints: Sequence[str] | None) -> list[str]:
-    """The joints of the columns of a position: as named, else by names of a DataFrame, else all joints of the robot.
-
-    Raises BadRequest if neither names nor the number of columns tell the joints; BadRobot if there is no such joint.
-    """
-    names = [joint.name for joint in robot.joints]
-    labels = [label for label in getattr(q, "columns", ()) if isinstance(label, str)]
-    width = 1 if np.ndim(q) == 1 else np.shape(q)[1] if np.ndim(q) == 2 else 0
-    if joints is None and not set(labels) <= set(names):
-        mismatch = f"q has the columns {', '.join(labels)}, but the joints of {robot.name} are {', '.join(names)}"
-        raise BadRequest(f"{mismatch}; rename the columns, or say with joints=[...] which joint each of them is")
-    chosen = list(joints) if joints is not None else labels or names
-    if len(chosen) != width:
-        count = f"q has shape {np.shape(q)}, but there are {len(chosen)} joints: {', '.join(chosen)}"
-        raise BadRequest(f"{count}; give one column a joint, and name other joints with joints=[...]")
-    return [robot.joint(name).name for name in chosen]
-
-
-def windows_of(name: str, windows: Windows, t: Array) -> list[list[float]]:
-    """Windows [[start, end], ...] [s] as Python's numbers; raises BadRequest where they are none, or not of the log."""
-    try:
-        spans = [[float(start), float(end)] for start, end in windows]
-    except (TypeError, ValueError) as error:
-        raise BadRequest(f"{name} is {windows!r}; give [[start, end], ...] in s from the first sample") from error
-    length = float(t[-1] - t[0])
-    for window in spans:
-        if window[0] > length:
-            raise BadRequest(f"{name} {window} begins after the log, of {length:.6g} s; count from its first sample")
-    return spans
-
-
-def columns_of(
-    times: Sequence[Samples], given: Mapping[str, Sequence[Samples]], joints: Sequence[str]
-) -> list[Columns]:
-    """The channels of each log; raises BadRequest with all that is wrong with its arrays, by their names."""
-    logs: list[Columns] = []
-    problems: list[str] = []
-    for i, t in enumerate(times):
-        place, before = f"log {i + 1}: " if len(times) > 1 else "", len(problems)
-        columns = {"time": np.asarray(t, np.float64)}
-        if columns["time"].ndim != 1 or len(columns["time"]) < MIN_SAMPLES:
-            problems.append(f"{place}t has shape {columns['time'].shape}; give (n,) times, of at least {MIN_SAMPLES}")
-        for symbol, values in given.items():
-            named = isinstance(values[i], pd.DataFrame) and set(joints) <= set(values[i].columns)
-            array = np.asarray(values[i][list(joints)] if named else values[i], np.float64)
-            array = array[:, None] if array.ndim == 1 else array
-            if array.shape != (len(columns["time"]), len(joints)):
-                needed = f"t has {len(columns['time'])} samples, and {len(joints)} joints need as many columns"
-                problems.append(f"{place}{symbol} has shape {np.shape(values[i])}, but {needed}")
-                continue
-            columns |= {f"{joint}.{symbol}": array[:, k] for k, joint in enumerate(joints)}
-        for name, column in columns.items():
-            if len(missing := np.flatnonzero(~np.isfinite(column))):
-                which = f"{len(missing)} values that are not finite, the first at sample {missing[0]}"
-                problems.append(f"{place}{name} has {which}; remove these samples from all arrays")
-        if len(problems) == before and (late := np.flatnonzero(np.diff(columns["time"]) <= 0)).size:
-            problems.append(f"{place}t does not increase at sample {late[0] + 1}; sort the samples by time")
-        logs.append(columns)
-    if problems:
-        raise BadRequest("\n".join(problems))
-    return logs
 
 
 class IdentifiedArm:
@@ -407,85 +339,6 @@ class IdentifiedArm:
         return read
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ExternalEffort:
-    """The external effort of the joints along a log: smoothed, with its standard deviation, and its contacts.
-
-    `record` holds the Track of each joint, which also has the effort of the filter without look-ahead.
-    """
-
-    record: tuple[Track, ...]
-    contact_record: tuple[Contact, ...]
-    labels: tuple[str, ...]
-    diagnostics: tuple[str, ...]
-    _log: tuple[Columns, dict[str, Any]]  # for `IdentifiedArm.save`
-
-    @property
-    def t(self) -> Array:
-        """Time (N,) [s] from the start of the log."""
-        return np.asarray(self.tau_ext.index)
-
-    @property
-    def tau_ext(self) -> pd.DataFrame:
-        """The external effort: a row a time, a column a joint."""
-        return by_joint({track.joint: (track.t, track.tau_ext_smooth) for track in self.record})
-
-    @property
-    def std(self) -> pd.DataFrame:
-        """The standard deviation of the external effort: a row a time, a column a joint."""
-        return by_joint({track.joint: (track.t, track.tau_ext_smooth_std) for track in self.record})
-
-    @property
-    def contacts(self) -> pd.DataFrame:
-        """Contacts, stated or detected: onset, release [s], peak, `middle_mean` (the level if held), mean, impulse.
-
-        In a stated window in which nothing was detected, `above` is 0.  One that is `small`, not stated and below twice
-        the alarm level, may be an error of the model.
-        """
-        names = ["joint", "alarm_level", *(name for name in Contact.columns() if name not in ("stated", "found"))]
-        frames = [as_frame(contact)[names].assign(small=is_small(contact)) for contact in self.contact_record]
-        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names, "small"])
-
-    def plot(self) -> Any:
-        """Plot the external effort with its 95 % band and the contacts; returns the axes, one a joint."""
-        axes = axes_of({t.joint: f"external {label}" for t, label in zip(self.record, self.labels, strict=True)})
-        for ax, track in zip(axes, self.record, strict=True):
-            half = 1.96 * track.tau_ext_smooth_std
-            ax.fill_between(track.t, track.tau_ext_smooth - half, track.tau_ext_smooth + half, color="C0", alpha=0.25)
-            ax.plot(track.t, track.tau_ext_smooth, "C0", lw=1)
-            for contact in self.contacts[self.contacts["joint"] == track.joint].itertuples():
-                ax.axvspan(contact.onset, contact.release, color="C1", alpha=0.2)
-        return axes
-
-    def __repr__(self) -> str:
-        """The contacts as a table."""
-        above = self.contacts[self.contacts["above"] == 1]
-        contacts = above[["joint", "onset", "release", "peak", "peak_std", "middle_mean", "small"]]
-        joints = ", ".join(track.joint for track in self.record)
-        return f"{joints}, {len(self.t)} samples, {len(contacts)} contacts of joints\n{contacts}"
-
-    def _repr_html_(self) -> str:
-        return as_html([self.tau_ext.describe().loc[["min", "mean", "max"]], self.contacts], self.diagnostics)
-
-
-def by_joint(columns: Mapping[str, tuple[Array, Array]]) -> pd.DataFrame:
-    """Time series (N,) as a DataFrame with a column a joint."""
-    return pd.DataFrame({joint: pd.Series(x, pd.Index(t, name="t")) for joint, (t, x) in columns.items()})
-
-
-def axes_of(labels: Mapping[str, str]) -> Any:
-    """One axes a joint (joints,), below each other, with the label of its effort."""
-    from matplotlib import pyplot
-
-    size = (8, 0.8 + 2.0 * len(labels))
-    _, axes = pyplot.subplots(len(labels), sharex=True, squeeze=False, figsize=size, layout="tight")
-    for ax, (joint, label) in zip(axes[:, 0], labels.items(), strict=True):
-        ax.set_ylabel(label)
-        ax.set_title(joint, loc="left", fontsize="medium")
-    axes[-1, 0].set_xlabel("time [s]")
-    return axes[:, 0]
-
-
 def new_texts(reading: Any) -> tuple[str, ...]:
     """The texts of the diagnostics of the new log."""
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
@@ -516,9 +369,3 @@ def doubts(reading: Any) -> list[str]:
 def texts_of(diagnostics: Iterable[Diagnostic]) -> tuple[str, ...]:
     """The texts of diagnostics, without duplicates."""
     return tuple(dict.fromkeys(str(text) for d in diagnostics for text in d.text))
-
-
-def as_html(tables: Sequence[pd.DataFrame], texts: Sequence[str]) -> str:
-    """Tables, with numbers of four digits, and a list of texts as HTML."""
-    parts = [table.to_html(float_format=lambda x: f"{x:.4g}") for table in tables]
-    return "".join([*parts, *(f"<p>{escape(text)}</p>" for text in texts)])
