@@ -7,6 +7,7 @@ import numpy as np
 from davinci_forces.exports.identified import Export, ExportedJoint, ExportOrigin
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.stepping import covariances
+from davinci_forces.identification.joint_models import Identified
 from davinci_forces.identification.regression import parameter_columns
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -103,7 +104,7 @@ def export(robot: Robot, structure: str, simulated: bool = True) -> Export:
             model = independent(joint, [*terms, *ADDED])
         fit = fit_of(model, structure, possible(model, 0 if structure == "coupled" else number))
         joints.append(ExportedJoint(joint.name, joint, fit, model, valid, online))
-    return Export(study, Catalogue(lambda kind: ()), None, tuple(joints), ORIGIN)
+    return Export(study, Catalogue(lambda kind: ()), Identified(robot, []), tuple(joints), ORIGIN)
 
 
 def motion_of(joint: ExportedJoint, moved: ArmMotion) -> ArmMotion:

@@ -230,7 +230,7 @@ def test_a_transient_at_the_start_is_left_out_whichever_quantity_shows_it(symbol
     assert made.periods == periods - 1
     assert made.t_start == pytest.approx(10.0, abs=0.011)
     assert re.search(rf"differs from the others in {symbol} of hand_roll by \d+\.\d times what noise explains", text)
-    averaged = f"Averages are of {periods - 1} of the {periods}.0 periods from 0.00 s on, 10.00 to {10 * periods}.00 s"
+    averaged = f"Averages are of {periods - 1} whole periods, 10.00 to {10 * periods}.00 s"
     assert f"{averaged}; the chosen model is fitted to all motion. Only if something touched the arm" in text
     assert "write skip = 10 in study.toml" in text
     degrees = 1000 * (periods - 2)
@@ -251,7 +251,7 @@ def test_what_does_not_fill_a_period_is_left_out_at_the_start_before_a_period_is
     assert made.periods == 5
     assert made.t_start == pytest.approx(6.0, abs=0.011)
     assert "the period from 0.00 to 10.00 s differs" in text
-    assert "Averages are of 5 of the 5.6 periods from 0.00 s on, 6.00 to 56.00 s" in text
+    assert "Averages are of 5 whole periods, 6.00 to 56.00 s" in text
     assert "write skip = 6 in study.toml" in text
 
 
@@ -275,7 +275,7 @@ def test_an_odd_period_among_others_is_named_and_kept():
     assert made.periods == 8
     assert "the period from 30.00 to 40.00 s differs from the others in tau of hand_roll by" in text
     assert "is kept, because it is not at an end" in text
-    assert text.endswith("Averages are of 8 of the 8.0 periods from 0.00 s on, 0.00 to 80.00 s")
+    assert text.endswith("Averages are of 8 whole periods, 0.00 to 80.00 s")
     assert "study.toml" not in text
 
 

@@ -57,6 +57,7 @@ from davinci_forces.study import AttachedMass, HapticScenario, LogEntry, Options
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES, TARE_ROLES
 from tests import test_tip
+from tests.arm import log_table
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "pipeline" / "davinci_forces"
@@ -525,6 +526,19 @@ def test_the_readme_is_two_screens_to_the_first_result_and_not_much_more():
     assert len(README.split()) <= 1000
     assert "leave no joint without an identification log" in README  # the only one of a joint may be on page one
     assert README.index("make all") < 4000
+
+
+def test_the_keys_of_a_log_that_the_readme_names_make_a_study(tmp_path):
+    *stated, (weight, tare) = re.findall(r"(?m)^   - `([^`]+)`(?: and `([^`]+)`)?:", README)
+    logs = (
+        log_table("bare", "bare.csv", "validation", ["instrument_slide"]),
+        log_table("pushed", "pushed.csv", "contact", ["hand_roll"], "\n".join(line for line, _ in stated)),
+        log_table("loaded", "loaded.csv", "weight", ["instrument_slide"], f"{weight}\n{tare}"),
+    )
+    (tmp_path / "study.toml").write_text("".join(['title = "Mine"\nrobot = "davinci"\nsimulated = true\n', *logs]))
+    study = reading.read(tmp_path)
+    assert (study.log("loaded").weight.mass, study.log("loaded").tare) == (0.5, "bare")
+    assert (study.log("pushed").free, study.log("pushed").contact) == (((0.0, 5.0),), ((12.0, 14.5),))
 
 
 @pytest.mark.medium

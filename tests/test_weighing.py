@@ -168,6 +168,7 @@ def test_the_column_that_made_the_effort_explains_it_better():
     y = x + 0.1 * rng.normal(size=600)
     assert better([rows(x, y)], [rows(other, y)]) > 4
     assert better([rows(other, y)], [rows(x, y)]) < -4
+    assert better([rows(x * (1 + 1e-7 * x), y)], [rows(x, y)]) == 0.0  # the same column but for rounding
 
 
 # The path that a tare shares

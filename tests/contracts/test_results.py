@@ -12,7 +12,7 @@ from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.records.record import Published
 from davinci_forces.report.results import REASONS, TOO_FEW, Result, Results, collect
 
-WORDS = {"exact", "stated", "count", "simulated truth", "p-value", "setting", "standard deviation"}
+WORDS = {"exact", "stated", "count", "simulated truth", "p-value", "setting", "time", "standard deviation"}
 WITH_STD = {  # what a referee asks the uncertainty of, by the words of the issue
     "errors": "*.rmse sensor.*.largest *.nrmse *.*_error *.relative_error_1111 *.r2 fit.*.mse fit.*.r2 *.fit_percent "
     "choice.*.score choice.*.training choice.*.over_periods tissue.*.error search.*.mse guess.*.mse",

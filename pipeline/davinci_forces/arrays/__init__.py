@@ -35,7 +35,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import Number
-from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, percent
+from davinci_forces.report.verdicts import BEYOND, MAX_OUTSIDE, MAX_SPEED_RATIO, band, covered_share, percent
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.runner import runs
@@ -361,7 +361,7 @@ def doubts(reading: Any) -> list[str]:
     spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
     return texts + [
-        f"{x.log}/{x.joint}: {narrow} {percent(x.coverage)} of free motion; judge by the alarm level"
+        f"{x.log}/{x.joint}: {narrow} {covered_share(x)} of free motion; judge by the alarm level"
         for x in spaces if band(x.coverage) == "bad"
     ]  # fmt: skip
 

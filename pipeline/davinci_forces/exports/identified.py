@@ -118,16 +118,16 @@ class Export:
 
     def negative_parameters(self) -> Iterator[str]:
         """Name springs that are negative beyond their error, and parameters that physics has positive."""
-        advice = (
-            "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have: "
-            "fit = 'independent.consistent' in [settings]"
-        )
+        advice = "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have"
+        consistent = {(fit.group, fit.model) for fit in self.identified.fits if fit.estimator == "consistent"}
         for key, (fit, model) in self.fits.items():
+            variant = fit.model if (fit.group, fit.model) in consistent else "independent"
+            remedy = f"{advice}: fit = '{variant}.consistent' in [settings]"
             for about, (name, value, std, unit) in zip(terms_of(model), parameters_of(fit), strict=True):
                 is_spring = about.term == stiffness
                 is_positive = is_spring or (about.term is not None and about.term.positive)
                 if is_positive and value < (-NORMAL_95 * std if is_spring else -SOLVER_ZERO):
-                    yield f"warning: {key}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {advice}"
+                    yield f"warning: {key}: {name} is negative, {value:.3g} +- {std:.2g} {unit}; {remedy}"
 
     def remarks(self) -> list[str]:
         """Name what the user has to know of bands and parameters."""

@@ -145,6 +145,7 @@ def _tables(export: Export, arm: IdentifiedArm, free: FreeLogs, lost: Sequence[t
     fit = arm.fit
     numbers = zip(fit.parameter, fit.theta.tolist(), fit.theta_std.tolist(), fit.unit, fit.combination, strict=True)
     yield "\n# Identified parameters\n\nOnly these combinations follow from the logs."
+    yield "Standard errors are those of the same model without the bounds of a mechanism."
     yield "Axes of a link have z along its joint."
     yield from _table("parameter", "value", "standard error", "unit", "combination")
     yield from (_row(name, f"{value:.6g}", f"{std:.2g}", unit, text) for name, value, std, unit, text in numbers)
@@ -172,7 +173,9 @@ def _lost(export: Export, arm: IdentifiedArm, free: FreeLogs) -> list[tuple[str,
         effort = (remaining_effort(about, value, arm.model, log.motion(arm.fit, about.joint)) for log in along)
         name = ADDED[DRIVE.index(about.term)] if about.term in DRIVE else about.term.name
         unit = export.study.robot.joint(about.joint).unit(about.term.unit)
-        rows.append((about.joint, name, f"{value:.5g}", unit, f"{100 * _rms(effort) / _rms(tau[about.joint]):.2g} %"))
+        rows.append(
+            (about.joint, name, f"{value:.5g}", unit, f"{round(100 * _rms(effort) / _rms(tau[about.joint]), 2):.2g} %")
+        )
     return rows
 
 

@@ -32,8 +32,8 @@ REASONS = {  # why a number has no standard error -> patterns of its key; a stud
     "setting": (  # chosen for all further computations
         "choice.*.cutoff", "choice.*.effort_lag", "choice.*.ridge", "choice.*.term.*", "tuning.*", "ekf.*.r_q",
         "ekf.*.r_dq", "ekf.*.q_dq", "ekf.*.q_tau", "haptics.tissue_stiffness", "haptics.at_frequency",
-        "contact.*.t_peak", "tip.*.onset", "tip.*.release",
     ),
+    "time": ("contact.*.t_peak", "tip.*.onset", "tip.*.release"),  # of a sample, or of a stated window
     "standard deviation": (  # itself one of another number, or a factor of one
         "fit.*.std_noise", "fit.*.std_model", "fit.*.std_classical", "*.filter_part", "*.lag_part", "*.smooth_part",
         "*.band_width", "ekf.*.clock_std", "weight.*.run_std", "weight.*.fit_std", "weight.*.false_mass",

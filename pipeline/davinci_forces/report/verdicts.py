@@ -278,6 +278,12 @@ def percent(share: float) -> str:
     return "–" if math.isnan(share) else "< 1 %" if 0.0 < share < 0.005 else in_format(round(100 * share), "d") + " %"
 
 
+def covered_share(space: FreeSpace) -> str:
+    """The share of free-space samples in a 95 % band, with its standard error."""
+    std = f" ± {round(100 * space.coverage_std)}" * (space.coverage_std >= 0.005)
+    return f"{round(100 * space.coverage)}{std} %"
+
+
 def is_hidden(error: float, std: float | None) -> bool:
     """Whether a model error, the root of a difference that is at least 0, would be printed as 0.00 ± 0.12."""
     return std is not None and std > 0.0 and error <= NO_ERROR * std

@@ -27,6 +27,7 @@ from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, of_left_out
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, students_95
 
+SAME_SQUARES = 1e-3  # of what is left of the efforts: models that leave as much are not told apart
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
 MIN_DEGREES = 3  # of freedom, with which the spread between periods is known
 # If a smaller share of a column's power is variance, an offset more than doubles the standard error.
@@ -170,10 +171,15 @@ def offset_std(row: Rows, mass: MassEstimate) -> float:
 
 
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:
-    """Number of standard errors by which these columns explain the efforts better than others do; < 0 if worse."""
-    gain = _squares(others) - _squares(rows)
+    """Number of standard errors by which these columns explain the efforts better than others do; < 0 if worse.
+
+    It is 0 where both leave nearly the same, as on a slide that moves up and down, of which mirrored columns are equal.
+    """
+    squares, of_others = _squares(rows), _squares(others)
+    gain = of_others - squares
     spread = np.sqrt(PARTS / (PARTS - 1) * np.sum((gain - gain.mean()) ** 2))
-    return float(gain.sum() / spread) if spread > 0 else 0.0
+    differ = abs(gain.sum()) > SAME_SQUARES * min(squares.sum(), of_others.sum())
+    return float(gain.sum() / spread) if differ and spread > 0 else 0.0
 
 
 def _squares(rows: Sequence[Rows]) -> Array:

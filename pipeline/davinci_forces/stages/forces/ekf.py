@@ -42,7 +42,7 @@ def run(
         yield divergence_warning(model, nis)
         if not np.isfinite(estimate.tau_ext).all():
             return
-    if offset.drifts:
+    if offset.drifts and not model.at_rest:  # where a joint rests, it is the friction that changes
         yield drift_warning(model, offset, joint.unit("{effort}"))
     free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     numbers = numbers_of(estimate, offset, converged, free)

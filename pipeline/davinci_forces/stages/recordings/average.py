@@ -161,9 +161,7 @@ def omissions(
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
     keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
     start, whole = t[agreeing.start], whole_periods(t[agreeing], length, first.rate)
-    periods = (last_time - first_time + 1.0 / first.rate) / length
-    span = f"{start:.2f} to {start + whole * length:.2f} s"
-    used = f"Averages are of {whole} of the {periods:.1f} periods from {first_time:.2f} s on, {span}"
+    used = f"Averages are of {whole} whole periods, {start:.2f} to {start + whole * length:.2f} s"
     rest = "; the chosen model is fitted to all motion. Only if something touched the arm in the rest, or the log is "
     remedy = f"faulty there, write {' and '.join(keys)} in study.toml: fits then leave the rest out"
     advice = rest + remedy if keys else ""

@@ -122,7 +122,9 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
             constant = f"; {varying} without its constant part, {mean}, {as_of}"
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
         share = percent(trusted.share)
-        share = f"{100 * trusted.share:.1f} %" if share == percent(verdicts.GOOD) else share
+        if share == percent(verdicts.GOOD):  # then in as many digits as show that it is more
+            exact = (f"{100 * trusted.share:.{digits}f}" for digits in range(1, 9))
+            share = next((f"{text} %" for text in exact if float(text) > 100 * verdicts.GOOD), share)
         text = f"the model error is {error}, {share} of the effort{constant or opposed}; "
         text += f"that of a good model is at most {percent(verdicts.GOOD)}.{offset_remedy(context, p)}"
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
@@ -168,7 +170,7 @@ def looks_at_narrow_bands(context: Context, trusts: list[Trust]) -> Iterator[tup
     logs = dict.fromkeys(literal(space.log) for _, space in narrow)
     names = [title(t.joint) if len(logs) == 1 else f"{title(t.joint)} in {literal(space.log)}" for t, space in narrow]
     where = as_list(names) + (f", {next(iter(logs))}" if len(logs) == 1 else "")
-    shares = as_list([percent(space.coverage) for _, space in narrow])
+    shares = as_list([verdicts.covered_share(space) for _, space in narrow])
     text = f"**{where}**: the 95 % band is too narrow: it covers only {shares} of free-space samples."
     if not all(t.share > verdicts.CAUTION for t, _ in narrow):  # else more logs do not calibrate it: the model is wrong
         text += f" {explanation('narrow-band')}"

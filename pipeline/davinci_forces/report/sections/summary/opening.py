@@ -18,6 +18,11 @@ from davinci_forces.study.review import STUDY
 
 MAX_MEASURED = 4  # forces, masses and stiffnesses on page one
 MIN_QUARTILES = 4  # pushes, below which quartiles are interpolated rather than observed
+WHY_CAUTION = {  # of a mass, by what `mass_level` says
+    "side": ", as the other side of its link explains the efforts better", "joints": ", as its joints differ",
+    "sign": ", as it is negative", "scale": ", as its 95 % interval excludes the stated one",
+    "wide": f", as its error exceeds {percent(verdicts.PRECISE)}",
+}  # fmt: skip
 MAX_NAMED = 3  # joints that a clause of the verdict names
 TO_SIGN = "Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject"
 
@@ -97,8 +102,7 @@ def forces_at_tip(context: Context) -> Iterator[str]:
         of_all = f", the largest of {len(contact)}" * (len(contact) > 1)
         coverage = [force.force_coverage for force in context.catalogue.select(TipForce, log=contact.log)]
         level = f"tip.{contact.log}.detection_level"
-        is_known = np.isfinite(context.results[level].value)
-        free = f"; without contact, 99 % stay below {context.number(level, 2)}" * bool(is_known)
+        free = f"; without contact, 99 % stay below {context.number(level, 2)}" if level in context.results else ""
         narrow = [share for share in coverage if band(share) == "bad"]
         beside = f"; its 95 % band covers only {percent(narrow[0])} of free space" if narrow else ""
         start, end = float(contact.onset[row]), float(contact.release[row])
@@ -125,10 +129,13 @@ def masses(context: Context) -> Iterator[str]:
     for weight in context.catalogue.records(Weight):
         mass = context.number(f"weight.{weight.log}.mass", 3)
         stated = f", stated {weight.stated_mass:g} kg" if np.isfinite(weight.stated_mass) else ""
-        offset = " (an offset of the effort would count as mass)" * bool(np.isnan(weight.joint_offset).all())
+        is_uncertain = bool(np.isnan(weight.joint_offset).all())
+        what = f"a change of its offset since {literal(weight.tare)}" if weight.tare else "an offset of the effort"
+        offset = f" ({what} would count as mass)" * is_uncertain
         level, why = grade_of_mass(context, weight)
         stated += ", which seems to have given a torque constant in use: no test of it" * (why == "taken")
-        yield f"**{literal(weight.log)}**: mass {mass}{offset}{doubt_of_mass(weight)}{stated}{verdict_at_end(level)}"
+        verdict = verdict_at_end(level) + WHY_CAUTION.get(why, "")
+        yield f"**{literal(weight.log)}**: mass {mass}{offset}{doubt_of_mass(weight)}{stated}{verdict}"
 
 
 def verdict_at_end(level: Level) -> str:
