@@ -290,11 +290,19 @@ def is_hidden(error: float, std: float | None) -> bool:
 
 
 def error_share(p: Prediction | None) -> str:
-    """The model error over the root mean square of the effort, as it is printed; at most twice its error if hidden."""
+    """The model error over the root mean square of the effort, as it is printed; at most twice its error if hidden.
+
+    In whole percent, or in as many digits as show that it is above a bound of a verdict.
+    """
     if p is None or not p.effort_rms > 0.0:
         return percent(math.nan)
     most = f"< {max(math.ceil(200.0 * p.model_error_std / p.effort_rms), 1)} %"
-    return most if is_hidden(p.model_error, p.model_error_std) else percent(p.model_error / p.effort_rms)
+    if is_hidden(p.model_error, p.model_error_std):
+        return most
+    share = p.model_error / p.effort_rms
+    bound = next((100 * x for x in (GOOD, CAUTION) if share > x and percent(share) == percent(x)), math.inf)
+    exact = (f"{100 * share:.{digits}f}" for digits in range(1, 9))
+    return next((f"{text} %" for text in exact if float(text) > bound), percent(share))
 
 
 def thresholds() -> list[tuple[str, ...]]:

@@ -143,7 +143,7 @@ def omissions(
     """Describe samples that do not repeat or repeat badly, what uses them, and the keys of study.toml that remove them.
 
     Times count from the log's first sample, as `skip` and `until` do.  Less than two periods at either end, as of a
-    rest, a run-in or a stop, are expected, so they are a note.
+    rest, a run-in, a transient or a stop, are expected, so they are a note.
     """
     t, gaps = first.t, gaps_at(first, periodic)
     first_time, last_time = t[periodic.start], t[periodic.stop - 1]
@@ -166,7 +166,7 @@ def omissions(
     remedy = f"faulty there, write {' and '.join(keys)} in study.toml: fits then leave the rest out"
     advice = rest + remedy if keys else ""
     short = max(t[agreeing.start] - t[0], t[-1] - t[agreeing.stop - 1]) < 2.0 * length
-    expected = sides and short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
+    expected = short and not gaps and not any(d.has_periods_on_both_sides for _, d in differing)
     if faults:
         repeats = f"{first.log}: joints repeat every {length:.4f} s"
         text = f"{repeats}; {'; '.join(faults)}. {used}{advice}"

@@ -121,11 +121,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
             as_of = "as of another payload or an offset of the current"
             constant = f"; {varying} without its constant part, {mean}, {as_of}"
         opposed = ", as where the effort has the wrong `sign`" if abs(trusted.share - 2.0) < NEAR_TWICE else ""
-        share = percent(trusted.share)
-        if share == percent(verdicts.GOOD):  # then in as many digits as show that it is more
-            exact = (f"{100 * trusted.share:.{digits}f}" for digits in range(1, 9))
-            share = next((f"{text} %" for text in exact if float(text) > 100 * verdicts.GOOD), share)
-        text = f"the model error is {error}, {share} of the effort{constant or opposed}; "
+        text = f"the model error is {error}, {verdicts.error_share(p)} of the effort{constant or opposed}; "
         text += f"that of a good model is at most {percent(verdicts.GOOD)}.{offset_remedy(context, p)}"
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / verdicts.GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
