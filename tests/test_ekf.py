@@ -397,10 +397,15 @@ def test_an_offset_of_the_day_is_taken_off_and_its_error_stated(identified):
     assert_allclose(made.tau_ext_smooth_std**2 - without.tau_ext_smooth_std**2, made.day_offset_std**2, rtol=1e-6)
 
 
-def test_an_offset_that_drifts_is_remarked_on(identified):
+def test_an_offset_that_drifts_is_remarked_on_and_warned_of_where_that_exceeds_the_models_error(identified):
     signal = arm.signal(seed=5, period=7.3, role="validation", external=lambda t: 0.02 * t)
-    *_, said = sorted(tracked(identified, signal, free=((0.0, 60.0),)), key=lambda r: isinstance(r, Diagnostic))
-    assert "drifts within the free windows" in said.text[0]
+    for error, severity in ((0.2, "warning"), (20.0, "note")):  # half of the drift is 0.3
+        made = tracked(identified, signal, [band_of("other", error=error)], free=((0.0, 60.0),))
+        [said] = [record for record in made if isinstance(record, Diagnostic)]
+        assert "drifts within the free windows" in said.text[0]
+        assert said.severity.tolist() == [severity]
+    object.__setattr__(signal, "at_rest", 1)
+    assert not [r for r in tracked(identified, signal, free=((0.0, 60.0),)) if isinstance(r, Diagnostic)]
 
 
 def test_a_clock_that_is_wrong_by_a_thousand_is_said_and_not_believed(identified):

@@ -656,11 +656,11 @@ def test_the_paragraph_states_currents_and_counts_the_parameters_that_joints_sha
     log = replace(full.study.logs[0], channels=(Source("hand_roll.i", "current", "current"),))
     about = replace(full, catalogue=records, study=replace(full.study, logs=(log, *full.study.logs[1:])))
     text = paragraph(about)
-    assert "from motor currents, stated torque constants, motor efforts and joint positions" in text
+    assert "from motor currents, assumed torque constants, motor efforts and joint positions" in text
     others = Catalogue(
         lambda kind: [f for f in fits if f.group == "hand_roll"] if kind is Fit else records.records(kind)
     )
-    assert "from motor currents, stated torque constants and joint" in paragraph(replace(about, catalogue=others))
+    assert "from motor currents, assumed torque constants and joint" in paragraph(replace(about, catalogue=others))
     together = "describes hand roll, hand pitch and instrument slide together"
     assert f"One model with {len(arm)} parameters {together}." in text
     assert f"({len(arm)} parameters" not in text

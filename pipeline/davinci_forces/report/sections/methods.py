@@ -102,7 +102,7 @@ def efforts_in_words(context: Context) -> str:
     """What the efforts of the joints that have a fit come from."""
     by_current, joints = context.study.joints_by_current, context.study.robot.joints
     return ", ".join(dict.fromkeys(
-        "motor currents, stated torque constants" if joint in by_current
+        "motor currents, assumed torque constants" if joint in by_current
         else "motor currents in A" if joint.effort else "motor efforts"
         for joint in joints if context.shown_fit(joint.name) is not None
     ))  # fmt: skip

@@ -42,8 +42,6 @@ def run(
         yield divergence_warning(model, nis)
         if not np.isfinite(estimate.tau_ext).all():
             return
-    if offset.drifts and not model.at_rest:  # where a joint rests, it is the friction that changes
-        yield drift_warning(model, offset, joint.unit("{effort}"))
     free = free_space(model.t, entry.possible_contact, model.rate, model.unscored)
     numbers = numbers_of(estimate, offset, converged, free)
     blocks = (
@@ -57,6 +55,9 @@ def run(
         variance, std, source = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
         variance_std = float(np.mean(std))
     model_part = float(np.sqrt(np.mean(np.maximum(variance - own**2, 0.0))))
+    if offset.drifts and not model.at_rest:  # where a joint rests, it is the friction that changes
+        kind = "warning" if 0.5 * abs(offset.drift) > model_part else "note"
+        yield drift_remark(kind, model, offset, joint.unit("{effort}"))
     smooth_rise = rise(tracker(SMOOTHER), parts[0], filter_noise)
     rounding = np.concatenate([
         rounding_error(smoothed[part], variance[part], 1.0 / model.rate, smooth_rise)
@@ -114,10 +115,10 @@ def divergence_warning(model: JointModel, nis: float) -> Diagnostic:
     return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", f"{message}; {remedy}")
 
 
-def drift_warning(model: JointModel, offset: DayOffset, unit: str) -> Diagnostic:
-    """Warn of an offset that changes between the free windows."""
+def drift_remark(kind: str, model: JointModel, offset: DayOffset, unit: str) -> Diagnostic:
+    """Say that an offset changes between the free windows; a warning where that is more than the model's error."""
     drift = f"{offset.drift:.3g} {unit}, with a standard error of {offset.drift_std:.2g} {unit}"
     message = f"{model.log}/{model.joint}: the offset drifts within the free windows by {drift}"
     follows = "so an effort far from them may be off by half of it more than its error says"
     remedy = "a shorter log, or free windows closer around what matters, make that less"
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", f"{message}, {follows}; {remedy}")
+    return diagnostic("ekf", f"{model.log}.{model.joint}", kind, f"{message}, {follows}; {remedy}")
