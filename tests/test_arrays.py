@@ -20,7 +20,7 @@ from davinci_forces import arrays
 from davinci_forces.arrays import IdentifiedArm
 from davinci_forces.errors import BadRequest, BadRobot, NotAFile
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.records import Contact, Fit, FreeSpace, JointModel, PathShare, Record, Track, store
+from davinci_forces.records import Contact, Fit, FreeSpace, JointModel, PathShare, Record, Threshold, Track, store
 from davinci_forces.records.record import COLUMN_DTYPES
 from davinci_forces.report.verdicts import BEYOND
 from davinci_forces.robots.robot import UNLIMITED
@@ -210,8 +210,33 @@ def test_a_loaded_study_predicts_and_estimates_as_its_records_do_without_a_new_f
     for file in fits:  # copies, of the same time, and not made anew
         copied = made._places.processed / file.relative_to(processed)
         assert copied.stat().st_mtime_ns == file.stat().st_mtime_ns
-    with pytest.raises(BadRequest, match=r"loaded from .*study: add the log to that study"):
-        made.save(folder / "other")
+    more = reading.read(made.save(folder.parent / "with-more", later=effort))
+    before = reading.read(folder)
+    assert (more.title, more.robot.joints) == (before.title, before.robot.joints)
+    assert [log.name for log in more.logs] == [*(log.name for log in before.logs), "later"]
+    assert not more.absent()
+
+
+def test_a_saved_folder_is_replaced_where_that_is_asked_for_and_it_holds_nothing_else(identified, tmp_path):
+    folder = identified.save(tmp_path / "raw" / "again")
+    with pytest.raises(NotAFile, match="exists"):
+        identified.save(folder)
+    identified.save(folder, title="Another", replaces=True)
+    assert reading.read(folder).title == "Another"
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(NotAFile, match=r"notes\.txt"):
+        identified.save(folder, replaces=True)
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_levels_are_there_also_where_no_contact_is(identified, folder):
+    effort = identified.external_effort(FIRST.t, FIRST.q, FIRST.tau, dq=FIRST.dq, free=[[0, 1000]])
+    assert len(effort.contacts) == 0
+    [level] = effort.levels.itertuples()
+    [threshold] = [t for t in of_study(folder, Threshold) if t.filter == "rts"]
+    assert level.joint == JOINT
+    assert 0.5 * threshold.alarm_level < level.alarm_level < 2.0 * threshold.alarm_level  # of one log more
+    assert 0.0 < level.detection_level < level.alarm_level
 
 
 def test_a_study_that_cannot_be_loaded_says_why(folder, tmp_path):
@@ -264,7 +289,7 @@ def test_a_prediction_of_motion_beyond_the_fitted_one_is_warned_of(identified):
         warnings.simplefilter("error")
         identified.predict(PUSHED.t, PUSHED.q, dq=PUSHED.dq)
     with pytest.warns(UserWarning, match=f"new/{JOINT}: .* of its samples are {BEYOND}"):
-        identified.predict(PUSHED.t, PUSHED.q + 2.0, dq=PUSHED.dq)
+        identified.predict(PUSHED.t, 0.0 * PUSHED.q + 2.0, dq=0.0 * PUSHED.dq)  # at rest
 
 
 def test_a_constant_offset_is_subtracted_where_free_windows_are_given(identified):

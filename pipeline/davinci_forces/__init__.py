@@ -19,18 +19,11 @@ __version__ = "0.2.0"  # pyproject.toml and the citation state it, too
 
 
 def identify(
-    robot: "str | Path | Robot | Mapping[str, Any]",
-    t: Any,
-    q: Any,
-    tau: Any,
-    *,
-    period: "float | Sequence[float] | None" = None,
-    dq: Any = None,
-    joints: "str | Sequence[str] | None" = None,
-    settings: "Mapping[str, Any] | None" = None,
-    roles: "Sequence[str] | None" = None,
+    robot: "str | Path | Robot | Mapping[str, Any]", t: Any, q: Any, tau: Any, *,
+    period: "float | Sequence[float] | None" = None, dq: Any = None, joints: "str | Sequence[str] | None" = None,
+    settings: "Mapping[str, Any] | None" = None, roles: "Sequence[str] | None" = None,
     names: "Sequence[str] | None" = None,
-) -> "IdentifiedArm":
+) -> "IdentifiedArm":  # fmt: skip
     """Identify the models of a robot's joints from arrays of free motion, as the stages do from a study's logs.
 
     `robot` is a name, a .toml or .urdf file, a dict with the keys of such a TOML file, or a Robot.  `t` (n,) is in s.

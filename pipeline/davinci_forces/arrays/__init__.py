@@ -27,9 +27,11 @@ from davinci_forces.records import (
     Diagnostic,
     ErrorBand,
     Fit,
+    FittedPaths,
     FreeSpace,
     JointModel,
     PathShare,
+    Threshold,
     Track,
     store,
 )
@@ -197,8 +199,10 @@ class IdentifiedArm:
         columns |= {f"{joint}.tau": np.zeros_like(columns["time"]) for joint in self.joints}
         reading = self._run(PREDICTED, self._contact_log(NEW, columns))
         models = [model for model in reading(JointModel) if model.log == NEW]
-        for text in unfitted_motion(share for share in reading(PathShare) if share.log == NEW):
-            warnings.warn(text, stacklevel=2)
+        paths = Identified(self.robot, reading(FittedPaths))
+        for model in models:
+            if (outside := paths.share_outside(model)) > MAX_OUTSIDE:
+                warnings.warn(f"{NEW}/{model.joint}: {percent(outside)} of its samples are {BEYOND}", stacklevel=2)
         if not models:
             raise BadRequest("\n".join(["the effort of no joint is predicted", *new_texts(reading)]))
         predictions: dict[str, pd.DataFrame] = {}
@@ -236,51 +240,63 @@ class IdentifiedArm:
         if not tracks:
             raise BadRequest("\n".join(["the external effort of no joint is estimated", *texts]))
         labels = tuple(self._effort_label(track.joint) for track in tracks)
-        return ExternalEffort(tuple(tracks), tuple(contacts), labels, texts, (columns, windows))
+        levels = tuple(threshold for threshold in reading(Threshold) if threshold.filter == SMOOTHER)
+        return ExternalEffort(tuple(tracks), tuple(contacts), levels, labels, texts, (columns, windows))
 
     def save(
-        self, folder: str | Path, *, title: str = "From arrays", simulated: bool = False,
+        self, folder: str | Path, *, title: str = "From arrays", simulated: bool = False, replaces: bool = False,
         **contact_logs: "ExternalEffort",
     ) -> Path:  # fmt: skip
         """Write the identified logs and study.toml to a new folder: `davinci_forces.run(arm.save("raw/mine"))` reports.
 
         The logs of external efforts are written, too, each under its name: `arm.save("raw/mine", push=effort)`.
-        Pages of a `simulated` study say so.
+        Pages of a `simulated` study say so.  An arm that was loaded writes its study, to which these logs are added.
+        A folder that holds only files of these names may be replaced.
 
         Raises
         ------
         NotAFile
-            If the folder exists.
+            If the folder exists, and is not to be or cannot be replaced.
         BadRequest
             If the robot was given as an object, of which there is no file, or two logs have one name.
         """
-        if self._arguments is None:
-            raise BadRequest(f"this arm was loaded from {self._study.folder}: add the log to that study instead")
-        target, (robot, settings) = Path(folder), self._arguments
+        target, home = Path(folder), self._study.folder
         if taken := sorted({log.name for log in self._study.logs} & {*contact_logs}):
             raise BadRequest(f"{taken[0]} is the name of an identified log; give the other log another name")
-        if isinstance(robot, Robot):
-            raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
-        file = "robot.toml" if isinstance(robot, Mapping) else Path(robot).name
-        lines = [f"title = {in_toml(title)}", f"robot = {in_toml(file)}", f"simulated = {in_toml(simulated)}"]
-        lines += ["", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
-        more = [self._contact_log(name, *effort._log) for name, effort in contact_logs.items()]
-        logs = (*self._study.logs, *more)
+        logs = [self._contact_log(name, *effort._log) for name, effort in contact_logs.items()]
+        if self._arguments is None:
+            contents = {
+                path.relative_to(home).as_posix(): read_bytes(path) for path in home.rglob("*") if path.is_file()
+            }
+            lines = [contents["study.toml"].decode().rstrip()]
+        else:
+            contents, lines = self._described(title, simulated)
+            logs = [*self._study.logs, *logs]
         for log in logs:
-            lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(Path(*log.files).name)}"]
+            [file] = log.files
+            contents[Path(file).name] = read_bytes(home / file)
+            lines += ["", "[[log]]", f"name = {in_toml(log.name)}", f"file = {in_toml(Path(file).name)}"]
             lines += [f"role = {in_toml(log.role)}", *([f"period = {log.period}"] if log.period else [])]
             windows = {"contact": log.contact, "free": log.free}
             lines += [f"{name} = {in_toml([list(window) for window in of])}" for name, of in windows.items() if of]
             lines += ["[log.channels]"]
             lines += [f"{in_toml(source.quantity)} = {in_toml(source.channel)}" for source in log.channels]
-        places = [self._study.folder / place for log in logs for place in log.files]
-        contents = {place.name: read_bytes(place) for place in places}
+        write_folder(target, contents | {"study.toml": ("\n".join(lines) + "\n").encode()}, replaces)
+        return target
+
+    def _described(self, title: str, simulated: bool) -> tuple[dict[str, bytes], list[str]]:
+        """The file of the robot, if it has one, and the lines of study.toml above its logs."""
+        assert self._arguments
+        robot, settings = self._arguments
+        if isinstance(robot, Robot):
+            raise BadRequest("a study names its robot: give `identify` the name of a listed robot, or a file")
+        file, contents = Path("robot.toml" if isinstance(robot, Mapping) else robot).name, dict[str, bytes]()
         if isinstance(robot, Mapping):
             contents[file] = "".join(f"{key} = {in_toml(value)}\n" for key, value in robot.items()).encode()
         elif Path(robot).suffix:
             contents[file] = read_bytes(Path(robot))
-        write_folder(target, contents | {"study.toml": ("\n".join(lines) + "\n").encode()})
-        return target
+        lines = [f"title = {in_toml(title)}", f"robot = {in_toml(file)}", f"simulated = {in_toml(simulated)}"]
+        return contents, [*lines, "", "[settings]", *(f"{key} = {in_toml(value)}" for key, value in settings.items())]
 
     def __getstate__(self) -> dict[str, Any]:
         raise BadRequest("an IdentifiedArm keeps its logs in a temporary folder and cannot be pickled; use `save`")
@@ -330,7 +346,7 @@ class IdentifiedArm:
         if not runner.run([stage]):
             raise BadRequest("\n".join(lines))
         for line in lines if stage != PREDICTED else ():  # a prediction is given no effort, which is no fault
-            warnings.warn(line.replace("warning: ", "", 1), stacklevel=4)
+            warnings.warn(line.replace("warning: ", "", 1), stacklevel=3 if more else 5)
 
         def read(kind: type[AnyRecord]) -> list[AnyRecord]:
             places = runner.plan.places().find((kind,))
@@ -344,20 +360,14 @@ def new_texts(reading: Any) -> tuple[str, ...]:
     return texts_of(d for d in reading(Diagnostic) if d.subject.partition(".")[0] == NEW)
 
 
-def unfitted_motion(shares: Iterable[PathShare]) -> list[str]:
-    """What page one of a report would doubt of the motion in logs: that it is beyond the fitted one."""
+def doubts(reading: Any) -> list[str]:
+    """What page one of a report would doubt: motion beyond the fitted one, and bands that are too narrow."""
     texts = []
-    for x in shares:
+    for x in (share for share in reading(PathShare) if share.role != FITTED):
         if x.speed_ratio > MAX_SPEED_RATIO:
             texts.append(f"{x.log}/{x.joint}: it moves {x.speed_ratio:.2g} times as fast as in any fitted log")
         if x.outside > MAX_OUTSIDE:
             texts.append(f"{x.log}/{x.joint}: {percent(x.outside)} of its samples are {BEYOND}")
-    return texts
-
-
-def doubts(reading: Any) -> list[str]:
-    """What page one of a report would doubt: motion beyond the fitted one, and bands that are too narrow."""
-    texts = unfitted_motion(share for share in reading(PathShare) if share.role != FITTED)
     spaces = [space for space in reading(FreeSpace) if space.filter == SMOOTHER and space.role != FITTED]
     narrow = "the 95 % band is too narrow: it covers only"
     return texts + [

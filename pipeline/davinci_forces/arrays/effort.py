@@ -10,7 +10,7 @@ import pandas as pd
 
 from davinci_forces.arrays.given import Columns
 from davinci_forces.maths.arrays import Array
-from davinci_forces.records import Contact, Track
+from davinci_forces.records import Contact, Threshold, Track
 from davinci_forces.report.verdicts import is_small
 from davinci_forces.runner.results.dataframes import as_frame
 
@@ -24,6 +24,7 @@ class ExternalEffort:
 
     record: tuple[Track, ...]
     contact_record: tuple[Contact, ...]
+    level_record: tuple[Threshold, ...]
     labels: tuple[str, ...]
     diagnostics: tuple[str, ...]
     _log: tuple[Columns, dict[str, Any]]  # for `IdentifiedArm.save`
@@ -42,6 +43,12 @@ class ExternalEffort:
     def std(self) -> pd.DataFrame:
         """The standard deviation of the external effort: a row a time, a column a joint."""
         return by_joint({track.joint: (track.t, track.tau_ext_smooth_std) for track in self.record})
+
+    @property
+    def levels(self) -> pd.DataFrame:
+        """The alarm level and the detection level of each joint, with their standard errors: a row a joint."""
+        names = ["joint", "alarm_level", "alarm_level_std", "detection_level", "detection_level_std"]
+        return pd.DataFrame([[getattr(level, name) for name in names] for level in self.level_record], columns=names)
 
     @property
     def contacts(self) -> pd.DataFrame:
