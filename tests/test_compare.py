@@ -124,9 +124,11 @@ def test_page_one_comes_first_what_was_not_chosen_last_and_ten_changes_of_a_join
     after |= {"tip.a.rms": 3.0, "ekf-euler.a.roll.level": 9.0}
     a, b = results(tmp_path / "a.json", **before), results(tmp_path / "b.json", **after)
     first, roll, slide, other = call("compare", a, b).split("\n\n")[:4]
-    assert first.endswith(
+    *_, counted, by_chance = first.splitlines()
+    assert counted.endswith(
         "changed: 2 of accuracy, 12 of model, 1 of contacts, 1 of forces, 1 of noise, 6 of candidates"
     )
+    assert by_chance.startswith("21 of the 21 with a standard error did; between independent recordings, about 1 would")
     listed = [line.strip().split("  ")[:2] for line in roll.splitlines()[2:-1]]
     assert [row[0] for row in listed] == ["accuracy"] * 2 + ["contacts"] + ["model"] * 7
     assert "fit.roll.chosen.lse.p11" in roll.splitlines()[5]
@@ -165,7 +167,7 @@ def test_a_parameter_of_a_joint_in_a_model_of_the_arm_is_that_joint_s(tmp_path):
     before |= {f"{keys[0]}.std_noise": 1.0}
     after = {key: value if key.startswith("threshold") else 9.0 for key, value in before.items()}
     pair = [results(tmp_path / f"{name}.json", **numbers) for name, numbers in (("a", before), ("b", after))]
-    groups = {part.split(":")[0]: part for part in call("compare", *pair).split("\n\n")[1:-1]}
+    groups = {part.split(":")[0]: part for part in call("compare", *pair).split("\n\n")[1:]}
     assert [*groups] == ["hand-roll", "roll", "arm"]
     counts = {name: part.splitlines()[0] for name, part in groups.items()}
     assert counts == {"hand-roll": "hand-roll: 3 changed", "roll": "roll: 1 changed", "arm": "arm: 1 changed"}

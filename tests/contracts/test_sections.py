@@ -881,11 +881,11 @@ def test_page_one_claims_no_absence_on_a_joint_that_something_seems_to_touch(ful
 
 def test_a_force_at_the_tip_by_the_effort_of_one_joint_is_called_unlikely(full: Context):
     [line] = opening.forces_at_tip(full)
-    assert "alone makes unlikely" not in line
+    assert "only one joint" not in line
     one = full.catalogue.select(Contact, log="tip", joint="instrument_slide")
     about = replace(full, catalogue=Catalogue(lambda k: one if k is Contact else full.catalogue.records(k)))
     [line] = [line for line in opening.forces_at_tip(about) if "force by the arm" in line]
-    assert ", if the arm was touched at its tip alone, which an effort on one joint alone makes unlikely" in line
+    assert "if the arm was touched at its tip alone; only one joint shows it, as a touch elsewhere would" in line
 
 
 def test_the_figure_of_page_one_shows_a_contact_log_before_a_free_one_in_which_a_contact_was_found(full: Context):
@@ -1178,9 +1178,9 @@ def test_a_change_of_the_baseline_has_a_true_minus_and_no_sign_without_a_standar
 
 @pytest.mark.parametrize(("number", "printed"), [(3, 3), (18, 18), (19, 10), (400, 10)])
 def test_the_weightiest_changes_of_the_baseline_are_on_paper(full: Context, number: int, printed: int):
-    """Whether or not they have standard errors; the keys are in the order of their weights."""
+    """Those without a standard error after those with one; the keys are in the order of their weights."""
     fits = [f"fit.roll.lse.p{i}" for i in range(number - 3)]
-    keys = ["effort.a.roll.coverage", "robot.condition", "noise.a.roll.sigma", *fits]
+    keys = ["effort.a.roll.coverage", "noise.a.roll.sigma", *fits, "robot.condition"]
     after = {
         key: StatedValue(2.0 + number - i, None if key == "robot.condition" else 0.1) for i, key in enumerate(keys)
     }

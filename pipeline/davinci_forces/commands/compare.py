@@ -2,7 +2,7 @@
 
 A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). If neither report has a standard error, a relative
 difference above 1e-9 is a change, but not among numbers below 2.2e-308. Another unit is a change, too. Accuracy, of
-which verdicts are made, is listed first, and what is not in use last. The exit code is always 0.
+which verdicts are made, is listed first, and what has no standard error last. The exit code is always 0.
 """
 
 import json
@@ -29,7 +29,7 @@ def run(
     every: Annotated[bool, Option("--all", help="List every change, not the ten largest of each joint.")] = False,
     as_json: Annotated[bool, Option("--json", help="Print rows of key, a, b, std of b - a, and z as JSON.")] = False,
 ) -> None:
-    """List what changed from A to B by joint: accuracy first, what is not in use last, each by standard errors."""
+    """List what changed from A to B by joint: first what has a standard error, by subject, then what has none."""
     from davinci_forces.runner import runs
 
     files = runs.results_of(a, reports), runs.results_of(b, reports)
@@ -67,15 +67,15 @@ def _lines(
     changed = [change for change in differing if change.before and change.after]
     shared = [key for key in before if key in after]
     lines = [f"{len(changed)} of the {len(shared)} shared numbers changed{counts(changed)}"]
+    if changed:
+        with_error = sum(before[key].std is not None or after[key].std is not None for key in shared)
+        chance = f"between independent recordings, about {0.05 * with_error:.0f} would by chance"
+        lines += [f"{sum(c.z is not None for c in changed)} of the {with_error} with a standard error did; {chance}"]
     for joint, group in by_joint(changed, [*before, *after]).items():
         lines += ["", f"{joint or 'not of one joint'}: {len(group)} changed"]
         rows = [("", "key", "a", "b", "std", "z"), *map(_cells, group[:most])]
         lines += [f"  {line}" for line in table(rows, right_from=2)]
         lines += [f"  and{counts(group[most:])[1:]}: --all lists them"] if group[most:] else []
-    if changed:
-        with_error = sum(before[key].std is not None or after[key].std is not None for key in shared)
-        share = f"about {0.05 * with_error:.0f} of the {with_error} numbers with a standard error"
-        lines += ["", f"between independent recordings, {share} would change by chance"]
     removed, added = [c.key for c in differing if not c.after], [c.key for c in differing if not c.before]
     for verb, keys in (("removed", removed), ("added", added)):
         more = [f"  and {len(keys) - most} more: --all lists them"] if len(keys) > most else []

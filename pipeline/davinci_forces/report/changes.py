@@ -77,14 +77,14 @@ class Change:
         return next((subject for subject, starts in SUBJECTS.items() if start in starts), "study")
 
     @property
-    def weight(self) -> tuple[int, bool, float]:
-        """A weight to sort by: the rank, then standard errors, then relative differences, then other changes."""
+    def weight(self) -> tuple[bool, int, float]:
+        """A weight to sort by: by rank those with standard errors, then by relative differences, then other changes."""
         rank, a, b = -RANKS[self.subject], *(x.number if x else None for x in (self.before, self.after))
         if self.z is not None:
-            return rank, True, abs(self.z)
+            return True, rank, abs(self.z)
         if a is None or b is None or not math.isfinite(b - a):
-            return rank, False, math.inf
-        return rank, False, abs(b - a) / max(abs(a), abs(b), math.ulp(0.0))
+            return False, rank, math.inf
+        return False, rank, abs(b - a) / max(abs(a), abs(b), math.ulp(0.0))
 
 
 def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue]) -> list[Change]:

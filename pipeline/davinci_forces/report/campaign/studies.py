@@ -53,11 +53,11 @@ class CampaignStudy:
         return f"[{words}]({self.report})"
 
     def friction_in_use(self, joint: str) -> dict[str, str]:
-        """Names, by key, of a joint's friction in the model that its model error is of; none if that is of FIT."""
+        """Names, by key, of a joint's friction and gravity in the model that its error is of; none if that is FIT."""
         error, slug = self.joints[joint].keys["model_error"] if joint in self.joints else "", joint.replace("-", "_")
         fit = re.sub(rf".*\.{joint}\.(.*?)(_by_log)?\.model_error", r"\1", error or "")
         # The key of a chosen model's error names no estimator: it is not that of the consistent parameters beside it.
-        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.([^.]*friction)(_of_{slug})?"
+        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.([^.]*(?:friction|gravity_(?:co)?sine))(_of_{slug})?"
         return {key: m[3] for key in self.numbers if fit != FIT and (m := re.fullmatch(own, key))}
 
 

@@ -110,7 +110,7 @@ def forces_at_tip(context: Context) -> Iterator[str]:
             of for of in context.catalogue.select(Contact, log=contact.log)
             if (of.above.astype(bool) & (of.onset < end) & (of.release > start)).any()
         ]  # fmt: skip
-        alone = ", which an effort on one joint alone makes unlikely" * (len(touched) == 1)
+        alone = "; only one joint shows it, as a touch elsewhere would" * (len(touched) == 1)
         yield (
             f"**{literal(contact.log)}**: force by the arm at its tip up to {largest} "
             f"({start:.1f} to {end:.1f} s{of_all}; in the base’s axes x: {x}, y: {y}, z: {z}), "
