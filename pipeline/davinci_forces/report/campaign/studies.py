@@ -57,7 +57,8 @@ class CampaignStudy:
         error, slug = self.joints[joint].keys["model_error"] if joint in self.joints else "", joint.replace("-", "_")
         fit = re.sub(rf".*\.{joint}\.(.*?)(_by_log)?\.model_error", r"\1", error or "")
         # The key of a chosen model's error names no estimator: it is not that of the consistent parameters beside it.
-        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.([^.]*(?:friction|gravity_(?:co)?sine))(_of_{slug})?"
+        name = rf"([^.]*friction|gravity_(co)?sine)(_of_{slug})?"
+        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.{name}"
         return {key: m[3] for key in self.numbers if fit != FIT and (m := re.fullmatch(own, key))}
 
 
