@@ -1369,7 +1369,8 @@ def test_the_largest_static_friction_of_each_joint_at_rest_is_stated_once(full: 
     texts = [block.text for block in runs.track_blocks(full, still) if isinstance(block, Prose)]
     [said] = [text for text in texts if "static level" in text]
     levels = [full.size(t, "static_friction", t.static_friction) for t in still[1:]]
-    assert said.endswith(f"up to that level: {levels[0]} on the hand roll and {levels[1]} on the hand pitch.")
+    each = f"{levels[0]} on the hand roll and {levels[1]} on the hand pitch"
+    assert said.endswith(f"up to that level, by the model at least: {each}.")
 
 
 def test_standstill_is_shaded_in_the_effort_of_page_one(full: Context):

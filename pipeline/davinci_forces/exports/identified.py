@@ -119,10 +119,10 @@ class Export:
     def negative_parameters(self) -> Iterator[str]:
         """Name springs that are negative beyond their error, and parameters that physics has positive."""
         advice = "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have"
-        consistent = {(fit.group, fit.model) for fit in self.identified.fits if fit.estimator == "consistent"}
+        others = [fit for fit in self.identified.fits if fit.estimator == "consistent" and fit.model != CHOSEN]
+        by_group = {fit.group: fit.model for fit in others}  # models that the setting `fit` may name
         for key, (fit, model) in self.fits.items():
-            variant = fit.model if (fit.group, fit.model) in consistent else "independent"
-            remedy = f"{advice}: fit = '{variant}.consistent' in [settings]"
+            remedy = f"{advice}: fit = '{by_group.get(fit.group, 'independent')}.consistent' in [settings]"
             for about, (name, value, std, unit) in zip(terms_of(model), parameters_of(fit), strict=True):
                 is_spring = about.term == stiffness
                 is_positive = is_spring or (about.term is not None and about.term.positive)
