@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from davinci_forces.arrays import IdentifiedArm
     from davinci_forces.filters.online import Stream
     from davinci_forces.robots.robot import Robot
-    from davinci_forces.runner.console import Verbosity
 
 __all__ = ["identify", "load", "read", "results", "robot", "run", "stream"]
 __version__ = "0.2.0"  # pyproject.toml and the citation state it, too
@@ -138,8 +137,7 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
     from davinci_forces.runner.processes import afresh
 
     how = afresh.run if sys.executable and (jobs > 1 or not arithmetic.is_pinned()) else runs.run
-    verbosity: Verbosity = "quiet" if quiet else "normal"
-    return how(Path(study), stages or ALL, force=force, jobs=jobs, verbosity=verbosity)
+    return how(Path(study), stages or ALL, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
 
 
 def results(study: str | Path) -> "pd.DataFrame":

@@ -117,10 +117,9 @@ class Export:
                 yield f"warning: {text}; judge its external effort by the alarm level"
 
     def negative_parameters(self) -> Iterator[str]:
-        """Name springs that are negative beyond their error, and parameters that physics has positive."""
+        """Name springs negative beyond their error, and what physics has positive, with a `fit` that settings take."""
         advice = "in a simulation or a compensation it can drive the joint; parameters that a mechanism can have"
-        others = [fit for fit in self.identified.fits if fit.estimator == "consistent" and fit.model != CHOSEN]
-        by_group = {fit.group: fit.model for fit in others}  # models that the setting `fit` may name
+        by_group = {f.group: f.model for f in self.identified.fits if f.estimator == "consistent" and f.model != CHOSEN}
         for key, (fit, model) in self.fits.items():
             remedy = f"{advice}: fit = '{by_group.get(fit.group, 'independent')}.consistent' in [settings]"
             for about, (name, value, std, unit) in zip(terms_of(model), parameters_of(fit), strict=True):
