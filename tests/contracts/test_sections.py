@@ -768,9 +768,13 @@ def test_a_negative_lifted_mass_reverses_the_direction_of_its_joint(full: Contex
 
 def test_the_remedy_for_a_negative_mass_names_the_joint_that_shows_it(full: Context):
     [of, *_] = full.catalogue.records(Weight)
-    shown = np.array([0.1, -0.3])
+    shown, errors = np.array([-0.4, -0.3]), np.array([0.9, 0.1])  # the second is the more certain to be negative
     two = {name: np.repeat(getattr(of, name)[:1], 2) for name in of.columns()}
-    two |= {"loaded": np.array(["hand_roll", "instrument_slide"], object), "mass_alone": shown}
+    two |= {
+        "loaded": np.array(["hand_roll", "instrument_slide"], object),
+        "mass_alone": shown,
+        "mass_alone_std": errors,
+    }
     turned = replace(of, mass=-0.1, mass_std=0.001, differing="", side="not told", **two)
     assert "the positive direction of the instrument slide is not" in weight_section.verdict(full, turned).text
     one = replace(turned, **{name: getattr(turned, name)[:1] for name in turned.columns()})
