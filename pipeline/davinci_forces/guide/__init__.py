@@ -78,9 +78,9 @@ def page(topic: str) -> Page:
     rows = re.findall(rf"(?mi)^\| ([^|]*{words}[^|]*) \|(.*)\|$", by_topic[TERMS].text)
     others = re.findall(rf"(?mi)^\| ([^|]*) \|(.*{words}.*)\|$", by_topic[TERMS].text) if not rows else []
     if rows or others:
-        said = [f"“{topic}” is no term of its own, but stands in what these mean:"] * (not rows)
-        said += [f"**{term}**:{means}" for term, means in rows or others]
-        return replace(by_topic[TERMS], write=lambda: "\n\n".join(said))
+        meanings = [f"“{topic}” is no term of its own, but stands in what these mean:"] * (not rows)
+        meanings += [f"**{term}**:{means}" for term, means in rows or others]
+        return replace(by_topic[TERMS], write=lambda: "\n\n".join(meanings))
     named = re.compile(rf"(?m)^\| `{re.escape(topic)}` \|(.*)\|$")
     rows = [(page.topic, row) for page in by_topic.values() for row in named.findall(page.text)]
     if rows:

@@ -103,8 +103,8 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
             values[parameter] = next(iter(records), None)
         else:
             values[parameter] = records if parameter in asks.in_turn else list(records)
-    given = {p: _log(folders, value) if asks.given[p] == "log" else value for p, value in task.given.items()}
-    return values | given
+    of_study = {p: _log(folders, value) if asks.given[p] == "log" else value for p, value in task.given.items()}
+    return values | of_study
 
 
 @dataclass(frozen=True)

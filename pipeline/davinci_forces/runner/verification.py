@@ -247,8 +247,8 @@ def compare_files(stored: Ledger, computed: Ledger) -> list[str]:
 
 def compare_numbers(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
     """Compare results by key, within the limits; raises as `recompute` does."""
-    found = ((what, key) for key in old | new for what in differences(key, old.get(key), new.get(key)))
-    groups = {DIFFERENT: list[str](), FAR: list[str]()} | groups_of(found)
+    pairs = ((what, key) for key in old | new for what in differences(key, old.get(key), new.get(key)))
+    groups = {DIFFERENT: list[str](), FAR: list[str]()} | groups_of(pairs)
     examples = {what: f" ({shorten(keys, MAX_NAMES)})" if keys else "" for what, keys in groups.items()}
     counts = "; ".join(f"{len(groups[what])} {what}{names}" for what, names in examples.items())
     head = "recomputed from raw/ with another processor or packages, so compared by number and not by byte"

@@ -60,9 +60,9 @@ class CoupledArm:
         """The base parameters, each named by the column of pi that it leads with, then the friction of each row."""
         L, base = 10 * len(self.chain.links), self.base
         columns = range(base.combination.shape[1])
-        every = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in columns]
-        sums = [combination(row, every) for row in base.combination]
-        leading = [every[c]._replace(combination=text) for c, text in zip(base.columns, sums, strict=True)]
+        of_columns = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in columns]
+        sums = [combination(row, of_columns) for row in base.combination]
+        leading = [of_columns[c]._replace(combination=text) for c, text in zip(base.columns, sums, strict=True)]
         return (
             *leading,
             *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms),

@@ -52,14 +52,14 @@ class CampaignStudy:
         words = literal(self.name).replace("]", "\\]")
         return f"[{words}]({self.report})"
 
-    def friction_in_use(self, joint: str) -> dict[str, str]:
+    def terms_in_use(self, joint: str) -> dict[str, str]:
         """Names, by key, of a joint's friction and gravity in the model that its error is of; none if that is FIT."""
         error, slug = self.joints[joint].keys["model_error"] if joint in self.joints else "", joint.replace("-", "_")
         fit = re.sub(rf".*\.{joint}\.(.*?)(_by_log)?\.model_error", r"\1", error or "")
         # The key of a chosen model's error names no estimator: it is not that of the consistent parameters beside it.
         name = rf"([^.]*friction|gravity_(co)?sine)(_of_{slug})?"
-        own = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.{name}"
-        return {key: m[3] for key in self.numbers if fit != FIT and (m := re.fullmatch(own, key))}
+        pattern = rf"fit\.({joint}|arm)\.{re.escape(fit)}(\.(?!consistent)\w+)?\.{name}"
+        return {key: m[3] for key in self.numbers if fit != FIT and (m := re.fullmatch(pattern, key))}
 
 
 Place = tuple[str, str, str, str]  # robot, joint, name and unit of a series
@@ -101,15 +101,16 @@ def every_series(studies: Sequence[CampaignStudy]) -> Iterator[Series]:
 
 
 def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
-    """Parameters, friction of the model in use, and measures of trust of a joint over one robot's studies, by unit."""
+    """Parameters, friction and gravity of the model in use, and measures of trust of a joint, by unit."""
     keyed: dict[tuple[str, str], list[tuple[CampaignStudy, str]]] = {}
     prefix = f"fit.{joint}.{FIT}."
-    newest = next((names for study in reversed(studies) if (names := study.friction_in_use(joint))), {})
-    for study in studies:
+    used = [study.terms_in_use(joint) for study in studies]
+    newest = next(filter(None, reversed(used)), {})
+    for study, terms in zip(studies, used, strict=True):
         named = [(key.removeprefix(prefix), key) for key in study.numbers if key.startswith(prefix)]
         results = study.joints.get(joint)
         floors = [(title, results.keys.get(name)) for name, title in FLOORS.items()] if results else []
-        in_use = newest if study.friction_in_use(joint) == newest else {}  # else another model, in other terms
+        in_use = terms if terms == newest else {}  # else another model, in other terms
         for name, key in [*named, *((f"{name} of the model in use", key) for key, name in in_use.items()), *floors]:
             if key is not None and key in study.numbers and name not in ABOUT_THE_FIT and ".std_" not in name:
                 keyed.setdefault((name, study.numbers[key].unit), []).append((study, key))

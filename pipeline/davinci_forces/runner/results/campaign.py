@@ -91,13 +91,13 @@ def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date
     time = {study.name: float(i) for i, study in enumerate(studies, 1)}
     if by_date:  # [days since 1970]
         time = {s.name: (s.when - datetime(1970, 1, 1)).total_seconds() / DAY for s in studies if s.when is not None}
-    known = [row for row in series if len(row.value) > 1 and np.isfinite([row.value, row.std]).all()]
-    times = {row.key: np.array([time[study.name] for study in row.studies]) for row in known}
-    lines = {row.key: line for row in known if (line := drift.trend(times[row.key], row.value, row.std)) is not None}
+    complete = [row for row in series if len(row.value) > 1 and np.isfinite([row.value, row.std]).all()]
+    times = {row.key: np.array([time[study.name] for study in row.studies]) for row in complete}
+    lines = {row.key: line for row in complete if (line := drift.trend(times[row.key], row.value, row.std)) is not None}
     # By kind of test, its series, and the number of the study in it.
     tests = {("drift", key, 0): line.p for key, line in lines.items()}
-    tests |= {("scatter", row.key, 0): drift.scatter(row.value, row.std) for row in known}
-    for row in known:
+    tests |= {("scatter", row.key, 0): drift.scatter(row.value, row.std) for row in complete}
+    for row in complete:
         probabilities = drift.outlier_probabilities(row.value, row.std).tolist()
         tests |= {("outlier", row.key, i): p for i, p in enumerate(probabilities)}
     rejections = drift.holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()

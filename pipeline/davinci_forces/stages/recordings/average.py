@@ -194,8 +194,8 @@ def reconcile_period(estimate: Period, entry: LogEntry) -> tuple[Period, list[st
         return Period(stated, estimate.std), []
     if difference <= MIN_MISMATCH * stated:
         return estimate, []
-    found = f"{estimate.length:.4f} s (+- {estimate.std:.1g} s), which is used"
-    what = f"{entry.name}: the study states a period of {stated} s, but the joints repeat every {found}"
+    measured = f"{estimate.length:.4f} s (+- {estimate.std:.1g} s), which is used"
+    what = f"{entry.name}: the study states a period of {stated} s, but the joints repeat every {measured}"
     return estimate, [f"{what}; correct the period in study.toml, or leave it out"]
 
 

@@ -36,7 +36,7 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
     moving = [track for joint in robot.joints for track in tracks if track.joint == joint.name and not track.at_rest]
     if len(moving) < TIP_JOINTS:
         return
-    free = free_of(moving, entry)
+    free = free_of(moving, entry.possible_contact)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
     if errors.shape[1] < MIN_FREE_SAMPLES or not errors.std(1).all():
         return
@@ -75,7 +75,7 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {why}")
         return
     tracks = [by_joint[joint.name] for joint in robot.joints]
-    free = free_of(tracks, entry) & entry.has_known_free_motion
+    free = free_of(tracks, entry.possible_contact) & entry.has_known_free_motion
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
     yield force
@@ -83,9 +83,9 @@ def apply(
     yield from tip_contacts(force, tracks, robot.chain, [*windows(entry, contacts)])
 
 
-def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
-    """Whether all joints move in free space at each sample (N,), for the smoother."""
-    free = [free_smoothed(track.t, entry.possible_contact, track.rate, track.unscored) for track in tracks]
+def free_of(tracks: Sequence[Track], windows: Sequence[tuple[float, float]]) -> Booleans:
+    """Whether all joints move in free space, outside these windows, at each sample (N,), for the smoother."""
+    free = [free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks]
     return np.asarray(np.all(free, axis=0))
 
 
@@ -205,7 +205,7 @@ def tip_contacts(
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
     u = f[at] / size[at, None]
-    free = free_smoothed_of(tracks, [*zip(onset, release, strict=True)])
+    free = free_of(tracks, [*zip(onset, release, strict=True)])
     rounding = rounded_off_joints(tracks, at, np.round((release - onset) * tracks[0].rate).astype(int), free)
     C, sigma_std, lost = peak_errors(force, tracks, chain, at, u, rounding)
     middle, middle_std = np.array([
@@ -227,12 +227,6 @@ def tip_contacts(
     )  # fmt: skip
 
 
-def free_smoothed_of(tracks: Sequence[Track], windows: Sequence[tuple[float, float]]) -> Booleans:
-    """Whether all joints are outside the windows, for the smoother, at each sample (N,)."""
-    free = [free_smoothed(track.t, windows, track.rate, track.unscored) for track in tracks]
-    return np.asarray(np.all(free, axis=0))
-
-
 def middle_force(
     force: TipForce, tracks: Sequence[Track], chain: Chain, window: tuple[float, float], free: Booleans
 ) -> tuple[float, float]:
@@ -248,12 +242,12 @@ def middle_force(
     means = [mean_effort(x.t, x.tau_ext_direct, window, free, y) for x, y in zip(tracks, friction, strict=True)]
     C_tau = tip_force.covariance([std for _, std in means], matrix(force.rho_12, force.rho_13, force.rho_23))
     f, C = tip_force.from_efforts(J, direct, C_tau)
-    known = np.isfinite(f[:, 0])
-    if not known.any():
+    regular = np.isfinite(f[:, 0])
+    if not regular.any():
         return np.nan, np.nan
-    mean = f[known].mean(axis=0)
+    mean = f[regular].mean(axis=0)
     size = float(np.linalg.norm(mean))
-    return size, float(np.sqrt(mean @ C[known].mean(axis=0) @ mean) / max(size, np.finfo(float).tiny))
+    return size, float(np.sqrt(mean @ C[regular].mean(axis=0) @ mean) / max(size, np.finfo(float).tiny))
 
 
 def rounded_off_joints(tracks: Sequence[Track], at: Integers, lengths: Integers, free: Booleans) -> Rounding:
